@@ -1,0 +1,245 @@
+//! The changes of a package: new texts of its parts.
+
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::ops::Range;
+use std::path::Path;
+
+use memmap2::Mmap;
+
+use super::units::{self, Nameless, UnitOf};
+use super::{Work, section};
+use crate::contract::error::{Error, Result};
+use crate::contract::report::AttributesKept;
+use crate::engine::clock::Clock;
+use crate::engine::files::{self, Made};
+use crate::engine::formats::Target;
+use crate::engine::together::Section;
+use crate::io::archive::Archive;
+use crate::io::read::{MeshRecords, PackageFile, Place, slicer};
+use crate::io::record::Record;
+use crate::io::write_behind::{self, WriteBehind};
+use crate::output::archive::{self, Durable};
+use crate::output::model::{self, Account, Change, MeshText, Unit};
+
+/// A new text of a part, as far as it is written.
+struct NewText {
+    file: File,
+    behind: WriteBehind,
+    /// Up to here, the old text is in it.
+    at: usize,
+}
+
+/// An object that was repaired: what it should be in the output.
+pub(super) struct Expected {
+    pub(super) place: Place,
+    /// Of all corners, in order.
+    pub(super) hash: blake3::Hash,
+    pub(super) triangles: u64,
+}
+
+/// Repairs the objects of a package one after the other.
+pub(super) struct Maker<'a> {
+    package: &'a PackageFile,
+    work: Work<'a>,
+    /// By number of the part.
+    texts: BTreeMap<usize, NewText>,
+    account: Account,
+    expected: Vec<Expected>,
+    /// The triangles of each volume of the slicer's, as they are now.
+    volumes: Vec<Range<u64>>,
+    /// An object's triangles are others than before.
+    is_changed: bool,
+}
+
+/// What a package becomes.
+pub(super) struct Changed {
+    /// New content by number of the entry.
+    content: BTreeMap<usize, Mmap>,
+    config: Option<(usize, Vec<u8>)>,
+    pub(super) account: Account,
+    pub(super) expected: Vec<Expected>,
+}
+
+/// A unit that was repaired.
+struct Mended {
+    made: Made,
+    /// The judged result.
+    result: crate::io::read::MeshFile,
+    /// Holds its bytes.
+    _spool: Nameless,
+}
+
+impl<'a> Maker<'a> {
+    pub(super) fn new(package: &'a PackageFile, work: Work<'a>) -> Self {
+        let volumes = package.volumes().iter().map(|volume| volume.triangles.clone()).collect();
+        let (texts, expected) = (BTreeMap::new(), Vec::new());
+        Self { package, work, texts, account: Account::default(), expected, volumes, is_changed: false }
+    }
+
+    /// Repairs the meshes of an object, and writes what came of them into the text of its part.
+    pub(super) fn object(&mut self, place: Place, sections: &mut Vec<Section>, clock: &mut Clock) -> Result<()> {
+        let read = self.package.read(place, self.work.limits, self.work.progress)?;
+        clock.stage("read");
+        let units = units::of(self.package, place, &read, self.work.limits)?;
+        let mut mended = Vec::with_capacity(units.len());
+        for unit in &units {
+            mended.push(if unit.is_repaired { Some(self.mend(unit, &read, sections, clock)?) } else { None });
+        }
+        self.expect(place, &units, &mended, &read);
+        let all: Vec<Unit<'_>> = units.iter().zip(&mended).map(|(unit, mended)| what_became(unit, mended.as_ref())).collect();
+        let text = mesh_text(self.package, place, &read);
+        let is_edited = all.iter().any(|unit| unit.change.is_some());
+        if !is_edited && model::is_numbered_once(&text, &units_as_they_are(&units, &read)) {
+            self.account.kept += read.with_property + read.with_vendor;
+            return Ok(());
+        }
+        let all = if is_edited { with_numbers(&units, all, &read) } else { units_as_they_are(&units, &read) };
+        self.write(place, &text, &all)?;
+        clock.stage("emit");
+        Ok(())
+    }
+
+    fn mend(&self, unit: &UnitOf, read: &MeshRecords, sections: &mut Vec<Section>, clock: &mut Clock) -> Result<Mended> {
+        let Work { profile, limits, progress } = self.work;
+        let mesh = units::spooled(self.package, unit, read, self.work)?;
+        let spool = Nameless::new(limits)?;
+        let target = Target { layout: None, is_input: true };
+        let made = files::make(mesh, &spool.path, target, (profile, limits), progress, clock)?;
+        sections.push(section(self.package, unit, made.report.clone(), &read.parsed.findings));
+        // Where nothing was written, the mesh stays as it came.
+        let result = if made.report.output.is_some() { files::open(&spool.path, limits, progress)? } else { made.mesh_as_it_came(limits, progress)? };
+        Ok(Mended { made, result, _spool: spool })
+    }
+
+    /// Notes what the object should be in the output.
+    fn expect(&mut self, place: Place, units: &[UnitOf], mended: &[Option<Mended>], read: &MeshRecords) {
+        let mut corners = super::read_back::Corners::default();
+        for (unit, mended) in units.iter().zip(mended) {
+            match mended {
+                Some(mended) => corners.add(mended.result.records()),
+                None => corners.add(records_of(unit, read)),
+            }
+        }
+        let (hash, triangles) = corners.finish();
+        self.expected.push(Expected { place, hash, triangles });
+    }
+
+    fn write(&mut self, place: Place, text: &MeshText<'_>, units: &[Unit<'_>]) -> Result<()> {
+        let (limits, path) = (self.work.limits, self.package.path());
+        let folder = limits.spool_folder();
+        let spooling = || Error::io(&folder, "spooling");
+        let new = match self.texts.entry(place.part) {
+            std::collections::btree_map::Entry::Occupied(there) => there.into_mut(),
+            std::collections::btree_map::Entry::Vacant(free) => {
+                let (file, behind) = write_behind::nameless(&folder, limits)?;
+                free.insert(NewText { file, behind, at: 0 })
+            }
+        };
+        let progress = self.work.progress;
+        let behind = &new.behind;
+        let mut sink = |bytes: &[u8]| {
+            if progress.cancelled() {
+                return Err(Error::cancelled(path, "writing"));
+            }
+            behind.append(bytes).map_err(spooling())
+        };
+        let written = model::write(text, units, new.at, &mut sink)?;
+        new.at = written.at;
+        self.account.add(written.account);
+        self.is_changed = true;
+        let mut at = 0;
+        for (volume, triangles) in self.package.volumes_at(place).into_iter().zip(&written.triangles) {
+            if let Some(range) = self.volumes.get_mut(volume) {
+                *range = at..at + triangles;
+            }
+            at += triangles;
+        }
+        Ok(())
+    }
+
+    /// Ends the texts.
+    pub(super) fn finish(self) -> Result<Changed> {
+        let folder = self.work.limits.spool_folder();
+        let spooling = || Error::io(&folder, "spooling");
+        let mut content = BTreeMap::new();
+        for (part, new) in self.texts {
+            let text = self.package.text(part);
+            for rest in text.get(new.at..).unwrap_or_default().chunks(1 << 20) {
+                new.behind.append(rest).map_err(spooling())?;
+            }
+            new.behind.finish().map_err(spooling())?;
+            // SAFETY: the file has no name, this is its only handle, and it is not written to any more.
+            let map = unsafe { Mmap::map(&new.file) }.map_err(Error::io(&folder, "mapping"))?;
+            let entry = self.package.entry_of(part).ok_or_else(|| Error::io(self.package.path(), "writing")(std::io::ErrorKind::NotFound.into()))?;
+            content.insert(entry, map);
+        }
+        let is_renumbered = self.package.volumes().iter().map(|volume| &volume.triangles).ne(&self.volumes);
+        let config = self.package.config().filter(|_| is_renumbered);
+        let config = config.map(|(entry, text)| (entry, slicer::renumbered(text, self.package.volumes(), &self.volumes)));
+        Ok(Changed { content, config, account: self.account, expected: self.expected })
+    }
+}
+
+impl Changed {
+    /// The package stays as it came.
+    pub(super) fn is_none(&self) -> bool {
+        self.content.is_empty() && self.config.is_none()
+    }
+
+    /// Writes the package to the new file `output`.
+    pub(super) fn write(&self, package: &PackageFile, output: &Path, work: Work<'_>) -> Result<Durable> {
+        let archive = Archive::open(package.bytes()).map_err(|rejection| rejection.at(package.path()))?;
+        let replaced = |entry: usize| {
+            let config = || self.config.as_ref().filter(|(own, _)| *own == entry).map(|(_, text)| text.as_slice());
+            self.content.get(&entry).map(|map| &map[..]).or_else(config)
+        };
+        if self.is_none() {
+            return archive::copy(package.bytes(), output, work.limits, work.progress);
+        }
+        archive::write(&archive, replaced, output, work.limits, work.progress)
+    }
+}
+
+impl Account {
+    /// For the report.
+    pub(super) fn told(self) -> AttributesKept {
+        let Self { kept, divided, approximated, inherited, lost } = self;
+        AttributesKept { kept, divided, approximated, inherited, lost }
+    }
+}
+
+fn records_of<'r>(unit: &UnitOf, read: &'r MeshRecords) -> &'r [Record] {
+    read.parsed.records.all().get(unit.triangles.clone()).unwrap_or_default()
+}
+
+fn mesh_text<'t>(package: &'t PackageFile, place: Place, read: &'t MeshRecords) -> MeshText<'t> {
+    let (text, vertices_end, triangles) = package.mesh_at(place);
+    MeshText { text, vertices_end, triangles, vertices: read.vertices() }
+}
+
+fn what_became<'u>(unit: &UnitOf, mended: Option<&'u Mended>) -> Unit<'u> {
+    let change = mended.filter(|mended| mended.made.is_written()).map(|mended| Change {
+        came: mended.made.mesh.as_it_came(),
+        now: mended.made.mesh.records(),
+        edit: &mended.made.edit,
+    });
+    let is_other = |change: &Change<'_>| !change.edit.is_empty() || change.came != change.now;
+    Unit { triangles: unit.triangles.len(), change: change.filter(is_other) }
+}
+
+/// Units that nothing was done to, as units whose vertices are numbered anew.
+fn units_as_they_are<'u>(units: &[UnitOf], read: &'u MeshRecords) -> Vec<Unit<'u>> {
+    let of = |unit: &UnitOf| {
+        let records = records_of(unit, read);
+        let change = unit.is_repaired.then_some(Change { came: records, now: records, edit: model::NO_EDIT });
+        Unit { triangles: records.len(), change }
+    };
+    units.iter().map(of).collect()
+}
+
+/// Vertices of units that stay are numbered anew where those of others are.
+fn with_numbers<'u>(units: &[UnitOf], all: Vec<Unit<'u>>, read: &'u MeshRecords) -> Vec<Unit<'u>> {
+    let same = units_as_they_are(units, read);
+    all.into_iter().zip(same).map(|(unit, same)| if unit.change.is_some() { unit } else { same }).collect()
+}

@@ -1,0 +1,177 @@
+//! Packages: several meshes in one file, each of which is repaired by itself.
+//!
+//! Each object's triangles, or each volume's of a slicer's project, become a nameless STL, which goes the way of a file. What the repair did is then
+//! written into the text of the object's part ([`crate::output::model`]), and the package is written anew around it. Two meshes are never
+//! welded or united, not even if they touch. The written package is read again, and each object compared with what it should be.
+
+mod change;
+mod read_back;
+mod units;
+
+use std::path::Path;
+
+use crate::contract::error::{Error, Result};
+use crate::contract::hint::HintKind;
+use crate::contract::progress::Progress;
+use crate::contract::report::{FileFacts, Format, Outcome, Report, Task};
+use crate::contract::settings::{KeepAttributes, Limits, Profile, folder_of};
+use crate::engine::clock::Clock;
+use crate::engine::files;
+use crate::engine::judging;
+use crate::engine::together::{Section, together};
+use crate::io::disk_space::{self, Need};
+use crate::io::read::PackageFile;
+use crate::output::emit;
+use crate::output::model::Account;
+use change::{Changed, Maker};
+
+/// Settings of a work on a package.
+#[derive(Clone, Copy)]
+pub(super) struct Work<'a> {
+    pub(super) profile: &'a Profile,
+    pub(super) limits: &'a Limits,
+    pub(super) progress: &'a dyn Progress,
+}
+
+/// Diagnoses every object of a package, and writes nothing.
+///
+/// # Errors
+/// [`Error`], any of them.
+pub(crate) fn inspect(package: &PackageFile, work: Work<'_>, clock: &mut Clock) -> Result<Report> {
+    let mut sections = Vec::new();
+    for place in package.meshes() {
+        let read = package.read(place, work.limits, work.progress)?;
+        clock.stage("read");
+        for unit in units::of(package, place, &read, work.limits)? {
+            if !unit.is_repaired {
+                continue;
+            }
+            let mesh = units::spooled(package, &unit, &read, work)?;
+            let report = files::look(&mesh, (work.profile, work.limits), work.progress, clock)?;
+            sections.push(section(package, &unit, report, &read.parsed.findings));
+        }
+    }
+    let mut report = together(&sections).ok_or_else(|| nothing(package))?;
+    package.check_unchanged()?;
+    report.task = Task::Inspect;
+    report.input = facts(package, files::hash_of(package.bytes(), work.limits), report.input.triangles);
+    certify(&mut report);
+    Ok(report)
+}
+
+/// Repairs every object of a package into the new file `output`.
+///
+/// # Errors
+/// [`Error`], any of them.
+pub(crate) fn repair(package: &PackageFile, output: &Path, work: Work<'_>, clock: &mut Clock) -> Result<Report> {
+    let folder = if emit::is_nameless(output) { work.limits.spool_folder() } else { folder_of(output).into() };
+    // What is packed anew takes about as much as before.
+    disk_space::check(package.path(), &[Need { folder, bytes: package.bytes().len() as u64 * 5 / 4, what: "the output" }])?;
+    let mut maker = Maker::new(package, work);
+    let mut sections = Vec::new();
+    for place in package.meshes() {
+        maker.object(place, &mut sections, clock)?;
+    }
+    let mut report = together(&sections).ok_or_else(|| nothing(package))?;
+    let input_hash = files::hash_of(package.bytes(), work.limits);
+    report.input = facts(package, input_hash, sections.iter().map(|section| section.report.input.triangles).sum());
+    let changed = maker.finish()?;
+    report.attributes = changed.account.is_any().then(|| changed.account.told());
+    let is_written = judge(package, &changed, &mut report, work.profile);
+    if is_written {
+        let made = changed.write(package, output, work)?;
+        clock.stage("pack");
+        let written = read_back::confirm(package, output, &changed, work)?;
+        clock.stage("read back");
+        let triangles = report.after.as_ref().unwrap_or(&report.before);
+        let triangles = triangles.triangles + triangles.nonfinite;
+        report.output = Some(facts(&written, files::hash_of(written.bytes(), work.limits), triangles));
+        made.durable()?;
+    } else {
+        report.output = None;
+        report.certificate = None;
+    }
+    package.check_unchanged()?;
+    certify(&mut report);
+    Ok(report)
+}
+
+/// Outcome and reasons that are of the package as a whole; whether there is something to write.
+fn judge(package: &PackageFile, changed: &Changed, report: &mut Report, profile: &Profile) -> bool {
+    if changed.is_none() {
+        // Good as it came; or not good, and nothing in it could be repaired, or was to be.
+        return report.outcome == Outcome::Clean || profile.repair;
+    }
+    if report.outcome == Outcome::Clean {
+        report.outcome = Outcome::Repaired;
+    }
+    let mut concerns = Vec::new();
+    if package.is_signed() {
+        concerns.push("the package is signed, and no signature holds of a package that was changed".to_owned());
+    }
+    let harmed = changed.account.lost + changed.account.approximated;
+    let words = || format!("colours, paint or other attributes of {harmed} triangles are lost or only about right");
+    match profile.attributes {
+        KeepAttributes::Refuse if harmed > 0 => {
+            report.outcome = Outcome::NotGood;
+            report.verdict.good = false;
+            report.verdict.reasons.insert(0, format!("{}: the profile `{}` refuses that", words(), profile.name));
+            return false;
+        }
+        KeepAttributes::Keep if harmed > 0 => concerns.push(words()),
+        _ => {}
+    }
+    if !concerns.is_empty() && report.outcome.is_good() {
+        report.outcome = Outcome::NeedsReview;
+        report.verdict.reasons.splice(0..0, concerns);
+    }
+    true
+}
+
+/// Gives the certificate the bytes that it is of.
+fn certify(report: &mut Report) {
+    let facts = report.output.as_ref().unwrap_or(&report.input);
+    if let Some(certificate) = &mut report.certificate {
+        (certificate.blake3, certificate.bytes, certificate.triangles) = (facts.blake3.clone(), facts.bytes, facts.triangles);
+        if let Some(faithful) = &mut certificate.faithful {
+            (faithful.original, faithful.bytes) = (report.input.blake3.clone(), report.input.bytes);
+        }
+    }
+}
+
+/// The report of one mesh as a section of the package's.
+fn section(package: &PackageFile, unit: &units::UnitOf, mut report: Report, findings: &[crate::io::read::Finding]) -> Section {
+    // A package says its unit.
+    report.hints.retain(|hint| !matches!(hint.kind, HintKind::Inches | HintKind::Metres));
+    let flaws = judging::flaws(findings);
+    report.input.findings = findings.iter().map(|finding| finding.text.clone()).collect();
+    if report.task == Task::Inspect && !flaws.is_empty() {
+        report.verdict.good = false;
+        report.outcome = Outcome::NotGood;
+        report.verdict.reasons.extend(flaws);
+    }
+    let (id, name, part) = package.names(unit.place);
+    let name = if unit.volume.is_empty() { name } else { [name.as_str(), unit.volume.as_str()].join(" ").trim().to_owned() };
+    Section { id, name, part, report }
+}
+
+fn facts(package: &PackageFile, blake3: String, triangles: u64) -> FileFacts {
+    FileFacts {
+        path: package.path().into(),
+        bytes: package.bytes().len() as u64,
+        blake3,
+        format: Format::ThreeMf,
+        triangles,
+        findings: package.findings().iter().map(|finding| finding.text.clone()).collect(),
+    }
+}
+
+fn nothing(package: &PackageFile) -> Error {
+    Error::Unreadable { path: package.path().into(), reason: "a package without a mesh of triangles".into() }
+}
+
+impl Account {
+    fn is_any(&self) -> bool {
+        *self != Self::default()
+    }
+}

@@ -1,0 +1,58 @@
+//! The written package, read again: does each object hold the triangles that it should?
+
+use std::path::Path;
+
+use super::Work;
+use super::change::Changed;
+use crate::contract::error::{Error, Result};
+use crate::geometry::position;
+use crate::io::read::PackageFile;
+use crate::io::record::Record;
+
+/// A hash of corners, in order. Equal positions have equal bytes in it.
+#[derive(Default)]
+pub(super) struct Corners {
+    hasher: blake3::Hasher,
+    triangles: u64,
+}
+
+impl Corners {
+    pub(super) fn add(&mut self, records: &[Record]) {
+        let mut bytes = Vec::with_capacity(36 << 10);
+        for group in records.chunks(1 << 10) {
+            bytes.clear();
+            for corner in group.iter().flat_map(position::corners) {
+                bytes.extend(position::bits(corner).map(u32::to_le_bytes).as_flattened());
+            }
+            self.hasher.update(&bytes);
+        }
+        self.triangles += records.len() as u64;
+    }
+
+    pub(super) fn finish(self) -> (blake3::Hash, u64) {
+        (self.hasher.finalize(), self.triangles)
+    }
+}
+
+/// Reads the package at `output` and compares its objects with what is expected.
+///
+/// # Errors
+/// [`Error::Io`] where one is another.
+pub(super) fn confirm(package: &PackageFile, output: &Path, changed: &Changed, work: Work<'_>) -> Result<PackageFile> {
+    let written = PackageFile::open(output, work.limits, work.progress)?;
+    let differs = || Error::io(output, "reading back")(std::io::Error::other("the package does not hold what was written to it"));
+    let places = written.meshes();
+    if places.len() != changed.expected.len() || written.bytes().is_empty() {
+        return Err(differs());
+    }
+    for (place, expected) in places.into_iter().zip(&changed.expected) {
+        let read = written.read(place, work.limits, work.progress)?;
+        let mut corners = Corners::default();
+        corners.add(read.parsed.records.all());
+        let is_it = corners.finish() == (expected.hash, expected.triangles);
+        if !is_it || written.names(place) != package.names(expected.place) {
+            return Err(differs());
+        }
+    }
+    Ok(written)
+}

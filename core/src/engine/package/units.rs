@@ -1,0 +1,98 @@
+//! The meshes of an object: all of it, or the volumes of a slicer's project.
+
+use std::fs::File;
+use std::ops::Range;
+use std::os::fd::AsRawFd;
+use std::path::{Path, PathBuf};
+
+use super::Work;
+use crate::contract::error::{Error, Result};
+use crate::contract::settings::Limits;
+use crate::engine::files;
+use crate::io::read::{MeshFile, MeshRecords, PREFIX_BYTES, PackageFile, Place};
+use crate::io::record::Record;
+use crate::io::write_behind;
+
+/// Triangles of an object that are one mesh.
+pub(super) struct UnitOf {
+    pub(super) place: Place,
+    pub(super) triangles: Range<usize>,
+    /// Part of the model; another one only tells the slicer where settings hold.
+    pub(super) is_repaired: bool,
+    /// Its number among the object's volumes, in words; empty for an object that is one mesh.
+    pub(super) volume: String,
+}
+
+/// The meshes of an object, in the order of its triangles.
+///
+/// # Errors
+/// [`Error::Unreadable`] if the object's volumes are not its triangles, one volume after the other, or a triangle has no vertices.
+pub(super) fn of(package: &PackageFile, place: Place, read: &MeshRecords, limits: &Limits) -> Result<Vec<UnitOf>> {
+    let _ = limits;
+    let count = read.parsed.records.all().len();
+    let refuse = |reason: &str| {
+        let (id, _, part) = package.names(place);
+        Error::Unreadable { path: package.path().into(), reason: format!("object {id} of the part {part} {reason}") }
+    };
+    if read.triangles != count as u64 {
+        return Err(refuse("has triangles whose vertices are not there"));
+    }
+    let volumes = package.volumes_of(place);
+    if volumes.is_empty() {
+        return Ok(vec![UnitOf { place, triangles: 0..count, is_repaired: true, volume: String::new() }]);
+    }
+    let mut at = 0;
+    let mut all = Vec::new();
+    for (number, volume) in volumes.iter().enumerate() {
+        let [from, to] = [volume.triangles.start, volume.triangles.end].map(|end| usize::try_from(end).unwrap_or(usize::MAX));
+        if from != at || to > count {
+            return Err(refuse("has volumes that are not its triangles, one volume after the other"));
+        }
+        at = to;
+        let words = if volumes.len() > 1 { format!("volume {}", number + 1) } else { String::new() };
+        all.push(UnitOf { place, triangles: from..to, is_repaired: volume.is_part, volume: words });
+    }
+    if at != count {
+        return Err(refuse("has volumes that are not its triangles, one volume after the other"));
+    }
+    Ok(all)
+}
+
+/// A file without a name, and the path that leads to it.
+pub(super) struct Nameless {
+    _file: File,
+    pub(super) path: PathBuf,
+}
+
+impl Nameless {
+    /// Empty.
+    pub(super) fn new(limits: &Limits) -> Result<Self> {
+        let (file, _) = write_behind::nameless(&limits.spool_folder(), limits)?;
+        Ok(Self::of(file))
+    }
+
+    fn of(file: File) -> Self {
+        let path = PathBuf::from(format!("/proc/self/fd/{}", file.as_raw_fd()));
+        Self { _file: file, path }
+    }
+}
+
+/// The triangles of a unit as an STL of their own, opened. Errors and reports name it as the package.
+///
+/// # Errors
+/// [`Error::NoSpace`], [`Error::Io`].
+pub(super) fn spooled(package: &PackageFile, unit: &UnitOf, read: &MeshRecords, work: Work<'_>) -> Result<MeshFile> {
+    let records = read.parsed.records.all().get(unit.triangles.clone()).unwrap_or_default();
+    let file = stl(package.path(), &read.parsed.header, records, work.limits)?;
+    let spool = Nameless::of(file);
+    Ok(files::open(&spool.path, work.limits, work.progress)?.called(package.path()))
+}
+
+fn stl(path: &Path, header: &[u8], records: &[Record], limits: &Limits) -> Result<File> {
+    let bytes = (PREFIX_BYTES + size_of_val(records)) as u64;
+    write_behind::spooled(path, limits, (bytes, "the triangles of an object"), |append| {
+        append(header)?;
+        append(&(records.len() as u32).to_le_bytes())?;
+        records.chunks(1 << 14).try_for_each(|chunk| append(chunk.as_flattened()))
+    })
+}

@@ -19,6 +19,9 @@ mod foreign;
 mod limits;
 mod mesh_file;
 mod number;
+// Not joined to the engine yet.
+#[allow(dead_code, unused_imports)]
+mod package;
 mod polygon;
 mod rounding;
 mod sniff;
@@ -27,6 +30,9 @@ mod tail;
 #[cfg(test)]
 mod tests;
 mod text;
+// Not joined to the engine yet.
+#[allow(dead_code, unused_imports)]
+mod threemf;
 mod vertices;
 // Not joined to the engine yet.
 #[allow(dead_code, unused_imports)]

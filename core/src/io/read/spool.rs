@@ -148,7 +148,7 @@ impl<const N: usize> Spool<'_, N> {
 }
 
 /// Items of `N` bytes in a file without a name.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(super) struct Items<const N: usize>(Option<Mmap>);
 
 impl<const N: usize> Items<N> {

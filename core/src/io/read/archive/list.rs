@@ -2,7 +2,7 @@
 
 use super::super::finding::Rejection;
 use super::entry::Entry;
-use super::name::{self, Seen, refused};
+use super::name::{self, Names, refused};
 use super::{central, end, local};
 use crate::util::words::Count;
 
@@ -17,6 +17,7 @@ pub(in super::super) struct Archive<'a> {
     pub(in super::super) bytes: &'a [u8],
     /// In the order of the central directory.
     pub(in super::super) entries: Vec<Entry>,
+    names: Names,
 }
 
 impl<'a> Archive<'a> {
@@ -32,11 +33,11 @@ impl<'a> Archive<'a> {
     pub(in super::super) fn open(bytes: &'a [u8]) -> Result<Self, Rejection> {
         let directory = end::directory(bytes)?;
         let mut entries = Vec::new();
-        let (mut seen, mut plain, mut at) = (Seen::default(), 0u64, directory.bytes.start);
+        let (mut names, mut plain, mut at) = (Names::default(), 0u64, directory.bytes.start);
         for number in 1..=directory.entries {
             let rest = bytes.get(at..directory.bytes.end).unwrap_or_default();
             let listed = central::read(rest, number)?;
-            seen.add(listed.name)?;
+            names.add(listed.name)?;
             plain = plain.saturating_add(listed.plain);
             if plain > MOST_PLAIN {
                 let reason = format!("the archive unpacks to more than {} GiB", Count(MOST_PLAIN >> 30));
@@ -65,12 +66,12 @@ impl<'a> Archive<'a> {
             return Err(Rejection::Unreadable(reason.into()));
         }
         check_overlap(&entries)?;
-        Ok(Self { bytes, entries })
+        Ok(Self { bytes, entries, names })
     }
 
-    /// The entry of this name, whatever the case of its ASCII letters. O(entries).
+    /// The entry of this name, whatever the case of its ASCII letters.
     pub(in super::super) fn find(&self, name: &str) -> Option<&Entry> {
-        self.entries.iter().find(|entry| entry.name.eq_ignore_ascii_case(name))
+        self.entries.get(self.names.find(name)?)
     }
 }
 

@@ -1,6 +1,6 @@
 //! Names of entries, and which of them are safe.
 
-use std::collections::HashSet;
+use std::collections::HashMap;
 
 use super::super::finding::Rejection;
 
@@ -67,17 +67,23 @@ pub(super) fn check(name: &[u8]) -> Result<(), Rejection> {
     Ok(())
 }
 
-/// Names seen so far. Names of parts are equal when they differ by the case of ASCII letters alone (ECMA-376 part 2, 6.2.2.3).
-#[derive(Default)]
-pub(super) struct Seen(HashSet<Vec<u8>>);
+/// Names and the numbers of their entries. Names of parts are equal when they differ by the case of ASCII letters alone (ECMA-376 part 2, 6.2.2.3).
+#[derive(Debug, Default)]
+pub(super) struct Names(HashMap<Vec<u8>, usize>);
 
-impl Seen {
-    /// Refuses a name that is there already.
+impl Names {
+    /// Adds a name, and refuses one that is there already.
     pub(super) fn add(&mut self, name: &[u8]) -> Result<(), Rejection> {
-        if self.0.insert(name.to_ascii_lowercase()) {
-            return Ok(());
+        let number = self.0.len();
+        match self.0.insert(name.to_ascii_lowercase(), number) {
+            None => Ok(()),
+            Some(_) => Err(refused(&text(name), "is there twice, or differs from another one by the case of letters alone")),
         }
-        Err(refused(&text(name), "is there twice, or differs from another one by the case of letters alone"))
+    }
+
+    /// The number of this name's entry.
+    pub(super) fn find(&self, name: &str) -> Option<usize> {
+        self.0.get(name.to_ascii_lowercase().as_bytes()).copied()
     }
 }
 
@@ -124,9 +130,9 @@ mod tests {
 
     #[test]
     fn names_are_equal_without_case() {
-        let mut seen = Seen::default();
-        assert!(seen.add(b"3D/A.model").is_ok() && seen.add(b"3D/B.model").is_ok());
-        assert!(seen.add(b"3d/a.MODEL").is_err());
-        assert!(seen.add("3D/Ä".as_bytes()).is_ok() && seen.add("3D/ä".as_bytes()).is_ok(), "ASCII alone");
+        let mut names = Names::default();
+        assert!(names.add(b"3D/A.model").is_ok() && names.add(b"3D/B.model").is_ok());
+        assert!(names.add(b"3d/a.MODEL").is_err());
+        assert!(names.add("3D/Ä".as_bytes()).is_ok() && names.add("3D/ä".as_bytes()).is_ok(), "ASCII alone");
     }
 }

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use quick_xml::escape::unescape;
 use quick_xml::events::attributes::Attributes;
 
-use super::scopes::{LONGEST_URI, Scopes, UNDECLARED};
+use super::scopes::{LONGEST_URI, Scopes};
 
 /// Attributes of an element, at most.
 const MOST_ATTRIBUTES: usize = 256;
@@ -102,15 +102,14 @@ impl<'a> Element<'a> {
         plain(found.value).map(Some)
     }
 
+    /// There is an attribute of this name without a prefix.
+    pub(in super::super) fn has(&self, name: &str) -> bool {
+        self.attributes.iter().any(|a| a.name == name && a.namespace.is_none())
+    }
+
     /// An attribute without a prefix, or with one, besides these without one.
     pub(in super::super) fn has_others_than(&self, names: &[&str]) -> bool {
         self.attributes.iter().any(|a| a.namespace.is_some() || !names.contains(&a.name))
-    }
-
-    /// Its name or an attribute has a prefix that is not declared.
-    pub(in super::super) fn is_undeclared(&self) -> bool {
-        let undeclared = |namespace: &Option<Arc<str>>| namespace.as_deref() == Some(UNDECLARED);
-        undeclared(&self.namespace) || self.attributes.iter().any(|a| undeclared(&a.namespace))
     }
 }
 

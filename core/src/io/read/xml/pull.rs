@@ -13,6 +13,8 @@ use crate::util::words::Count;
 
 /// Elements in each other, at most.
 const DEEPEST: usize = 64;
+/// Bytes of a piece of text, at most.
+const LONGEST_TEXT: usize = 64 << 10;
 const BOM: &[u8] = b"\xef\xbb\xbf";
 
 /// What stands next.
@@ -21,7 +23,7 @@ pub(in super::super) enum Node<'a> {
     Start(Element<'a>),
     /// The end of the innermost open element; its end tag stands there.
     End(Range<usize>),
-    /// A piece of text, its references resolved.
+    /// A piece of text, its references resolved, cut to 64 KiB.
     Text(String),
     /// The end of the part.
     Over,
@@ -45,6 +47,8 @@ pub(in super::super) struct Xml<'a> {
     scopes: Scopes,
     /// The element that was told of last is a tag of its own.
     ends: bool,
+    /// It is a piece, whose outermost elements stand in others.
+    piece: bool,
 }
 
 impl<'a> Xml<'a> {
@@ -61,17 +65,27 @@ impl<'a> Xml<'a> {
         Ok(Self::at(part, text, base, Scopes::default()))
     }
 
-    /// Of a piece of a part that stands within these namespaces.
-    pub(in super::super) fn within(part: &'a str, text: &'a [u8], scopes: Scopes) -> Self {
-        Self::at(part, text, 0, scopes)
+    /// Of a piece of a part that stands within these namespaces: what lies between two bytes of `text`, and may hold several elements and any text.
+    pub(in super::super) fn within(part: &'a str, text: &'a [u8], piece: Range<usize>, scopes: Scopes) -> Self {
+        let text = text.get(..piece.end).unwrap_or(text);
+        Self { piece: true, ..Self::at(part, text, piece.start, scopes) }
     }
 
     fn at(part: &'a str, text: &'a [u8], base: usize, scopes: Scopes) -> Self {
-        Self { part, text, base, reader: reader(text.get(base..).unwrap_or_default()), open: Vec::new(), scopes, ends: false }
+        Self {
+            part,
+            text,
+            base,
+            reader: reader(text.get(base..).unwrap_or_default()),
+            open: Vec::new(),
+            scopes,
+            ends: false,
+            piece: false,
+        }
     }
 
-    /// Where the reading stands in the part.
-    fn position(&self) -> usize {
+    /// Where the reading stands in the part: behind the tag that was told of last.
+    pub(in super::super) fn position(&self) -> usize {
         self.base.saturating_add(usize::try_from(self.reader.buffer_position()).unwrap_or(usize::MAX)).min(self.text.len())
     }
 
@@ -187,7 +201,8 @@ impl<'a> Xml<'a> {
                 }
                 Ok(Event::CData(data)) => {
                     if attributes {
-                        return Ok(Node::Text(String::from_utf8_lossy(&data).into_owned()));
+                        let start = data.get(..LONGEST_TEXT).unwrap_or(&data);
+                        return Ok(Node::Text(String::from_utf8_lossy(start).into_owned()));
                     }
                 }
             }
@@ -197,13 +212,14 @@ impl<'a> Xml<'a> {
     /// A piece of text, if it is asked for and more than blank.
     fn text_of(&self, raw: &[u8], at: usize, wanted: bool) -> Result<Option<String>, Rejection> {
         let blank = raw.iter().all(u8::is_ascii_whitespace);
-        if self.open.is_empty() && !blank {
+        if self.open.is_empty() && !blank && !self.piece {
             return Err(self.damaged(at, "text outside of its elements"));
         }
         if blank || !(wanted || raw.first() == Some(&b'&')) {
             return Ok(None);
         }
         let raw = std::str::from_utf8(raw).map_err(|_| self.damaged(at, "text that is no UTF-8"))?;
+        let raw = raw.get(..raw.floor_char_boundary(LONGEST_TEXT)).unwrap_or(raw);
         let text = quick_xml::escape::unescape(raw);
         let text = text.map_err(|_| self.damaged(at, "a reference to an entity or a character that is not there"))?;
         Ok(wanted.then(|| text.into_owned()))

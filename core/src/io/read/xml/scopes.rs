@@ -6,7 +6,7 @@ use std::sync::Arc;
 pub(super) const LONGEST_URI: usize = 1024;
 const XML: &str = "http://www.w3.org/XML/1998/namespace";
 /// What stands for the namespace of a prefix that is not declared; no URI.
-pub(super) const UNDECLARED: &str = "undeclared";
+const UNDECLARED: &str = "undeclared";
 
 /// Prefixes and their namespaces, the inner ones last. Cheap to copy as long as nothing is declared.
 #[derive(Clone, Debug, Default)]

@@ -59,6 +59,11 @@ impl<'a> Context<'a> {
         self.spool(u64::from(u32::MAX))
     }
 
+    /// A spool for text: what is unpacked of an archive.
+    pub(super) fn text(&self) -> Result<Spool<'a, 1>> {
+        self.spool(u64::MAX)
+    }
+
     fn spool<const N: usize>(&self, most: u64) -> Result<Spool<'a, N>> {
         let (file, behind) = write_behind::nameless(self.spool, self.limits)?;
         Ok(Spool { folder: self.spool, path: self.path, file, behind, count: 0, most })
@@ -143,7 +148,7 @@ impl<const N: usize> Spool<'_, N> {
 }
 
 /// Items of `N` bytes in a file without a name.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(super) struct Items<const N: usize>(Option<Mmap>);
 
 impl<const N: usize> Items<N> {

@@ -1,0 +1,202 @@
+//! The outline of one part: all of it but vertices and triangles.
+
+use std::borrow::Cow;
+use std::collections::HashMap;
+
+use super::super::finding::Rejection;
+use super::super::spool::Items;
+use super::super::xml::{Element, Node, Xml};
+use super::extensions::{self, CORE, PRODUCTION};
+use super::model::{Item, Part, Unit};
+use super::object::{self, reference};
+use crate::util::words::Count;
+
+/// Bytes that outlines of a package take, at most: a small archive unpacks to very many empty objects.
+const MOST_BYTES: usize = 256 << 20;
+/// Bytes of metadata that are kept of a part.
+const METADATA: usize = 1 << 20;
+
+/// Counts what outlines take.
+#[derive(Debug, Default)]
+pub(super) struct Budget {
+    spent: usize,
+}
+
+impl Budget {
+    /// Counts a thing with these strings.
+    pub(super) fn spend(&mut self, xml: &Xml<'_>, strings: usize) -> Result<(), Rejection> {
+        self.spent = self.spent.saturating_add(strings).saturating_add(512);
+        if self.spent > MOST_BYTES {
+            return Err(xml.refuse(format!("has too many objects: they take more than {} MiB", MOST_BYTES >> 20)));
+        }
+        Ok(())
+    }
+}
+
+/// Reads attributes of an element, and refuses them in its name.
+pub(super) struct Attributes<'x, 'a> {
+    pub(super) xml: &'x Xml<'a>,
+    pub(super) element: &'x Element<'a>,
+}
+
+impl<'a> Attributes<'_, 'a> {
+    pub(super) fn refuse(&self, reason: impl std::fmt::Display) -> Rejection {
+        self.xml.refuse_element(self.element, reason)
+    }
+
+    pub(super) fn plain(&self, name: &str) -> Result<Option<Cow<'a, str>>, Rejection> {
+        self.element.plain(name).map_err(|reason| self.refuse(reason))
+    }
+
+    pub(super) fn of(&self, namespace: &str, name: &str) -> Result<Option<Cow<'a, str>>, Rejection> {
+        self.element.of(namespace, name).map_err(|reason| self.refuse(reason))
+    }
+
+    /// The value of an attribute, empty if it is not there.
+    pub(super) fn text(&self, name: &str) -> Result<String, Rejection> {
+        Ok(self.plain(name)?.unwrap_or_default().into_owned())
+    }
+
+    /// A value of the production extension, empty if it is not there.
+    pub(super) fn production(&self, name: &str) -> Result<String, Rejection> {
+        Ok(self.of(PRODUCTION, name)?.unwrap_or_default().into_owned())
+    }
+
+    /// A number of a resource or of something in it.
+    pub(super) fn id(&self, name: &str) -> Result<Option<u32>, Rejection> {
+        let Some(text) = self.plain(name)? else { return Ok(None) };
+        let id = text.trim().parse().map_err(|_| self.refuse(format!("has no number in its attribute {name}")))?;
+        Ok(Some(id))
+    }
+}
+
+/// Reads a part.
+///
+/// # Errors
+/// A reason that names the part, and the place in it.
+pub(super) fn read(name: &str, text: Items<1>, budget: &mut Budget) -> Result<Part, Rejection> {
+    let mut part = Part {
+        name: name.to_owned(),
+        text: Items::default(),
+        unit: Unit::Millimeter,
+        metadata: Vec::new(),
+        objects: Vec::new(),
+        by_id: HashMap::new(),
+        items: Vec::new(),
+    };
+    let mut xml = Xml::of(name, text.all().as_flattened())?;
+    let root = xml.child()?.filter(|root| root.is(CORE, "model"));
+    let Some(root) = root else { return Err(xml.refuse("holds no 3MF model")) };
+    let attributes = Attributes { xml: &xml, element: &root };
+    part.unit = unit(&attributes)?;
+    require(&attributes)?;
+    let (mut kept, mut builds) = (0, 0);
+    while let Some(child) = xml.child()? {
+        if child.is(CORE, "resources") {
+            resources(&mut xml, &mut part, budget)?;
+        } else if child.is(CORE, "build") {
+            builds += 1;
+            build(&mut xml, &mut part, budget)?;
+        } else if child.is(CORE, "metadata") {
+            metadata(&mut xml, &child, &mut part, &mut kept)?;
+        } else {
+            xml.skip()?;
+        }
+    }
+    if builds > 1 {
+        return Err(xml.refuse("has more than one build"));
+    }
+    if !matches!(xml.next()?, Node::Over) {
+        return Err(xml.refuse("has more than one model"));
+    }
+    drop(xml);
+    part.text = text;
+    Ok(part)
+}
+
+/// The unit of a model; millimetres if it has none.
+fn unit(attributes: &Attributes<'_, '_>) -> Result<Unit, Rejection> {
+    Ok(match attributes.plain("unit")?.as_deref().map(str::trim) {
+        None | Some("millimeter") => Unit::Millimeter,
+        Some("micron") => Unit::Micron,
+        Some("centimeter") => Unit::Centimeter,
+        Some("inch") => Unit::Inch,
+        Some("foot") => Unit::Foot,
+        Some("meter") => Unit::Meter,
+        Some(other) => {
+            return Err(attributes.refuse(format!("has a unit that 3MF does not have, {}", super::super::archive::shown(other))));
+        }
+    })
+}
+
+/// Refuses a model that requires what is not understood.
+fn require(attributes: &Attributes<'_, '_>) -> Result<(), Rejection> {
+    let required = attributes.plain("requiredextensions")?.unwrap_or_default();
+    for prefix in required.split_ascii_whitespace() {
+        let namespace = attributes.xml.scopes().namespace(prefix);
+        let namespace = namespace.as_deref().unwrap_or(prefix);
+        if !extensions::is_understood(namespace) {
+            let words = match namespace.contains(':') {
+                true => extensions::words(namespace),
+                false => super::super::archive::shown(prefix),
+            };
+            return Err(attributes.xml.refuse(format!("requires an extension of 3MF that is not understood: {words}")));
+        }
+    }
+    Ok(())
+}
+
+fn resources(xml: &mut Xml<'_>, part: &mut Part, budget: &mut Budget) -> Result<(), Rejection> {
+    while let Some(child) = xml.child()? {
+        if !child.is(CORE, "object") {
+            xml.skip()?;
+            continue;
+        }
+        let object = object::read(xml, &child, budget)?;
+        let number = part.objects.len();
+        if part.by_id.insert(object.id, number).is_some() {
+            return Err(xml.refuse_element(&child, format!("has the id {} as another object has it", Count(object.id))));
+        }
+        part.objects.push(object);
+    }
+    Ok(())
+}
+
+fn build(xml: &mut Xml<'_>, part: &mut Part, budget: &mut Budget) -> Result<(), Rejection> {
+    while let Some(child) = xml.child()? {
+        if child.is(CORE, "item") {
+            let attributes = Attributes { xml, element: &child };
+            let printable = attributes.plain("printable")?;
+            let item = Item {
+                component: reference(&attributes)?,
+                printable: !matches!(printable.as_deref().map(str::trim), Some("0" | "false")),
+                part_number: attributes.text("partnumber")?,
+                uuid: attributes.production("UUID")?,
+                tag: child.tag.clone(),
+            };
+            budget.spend(xml, item.part_number.len() + item.uuid.len() + item.component.path.as_ref().map_or(0, String::len))?;
+            part.items.push(item);
+        }
+        xml.skip()?;
+    }
+    Ok(())
+}
+
+/// Keeps the beginning of metadata, up to a bound for all of them.
+fn metadata(xml: &mut Xml<'_>, element: &Element<'_>, part: &mut Part, kept: &mut usize) -> Result<(), Rejection> {
+    let name = Attributes { xml, element }.text("name")?;
+    let mut value = String::new();
+    loop {
+        match xml.next()? {
+            Node::Text(text) if value.len() + text.len() <= METADATA => value.push_str(&text),
+            Node::Text(_) => {}
+            Node::Start(_) => drop(xml.skip()?),
+            Node::End(_) | Node::Over => break,
+        }
+    }
+    *kept += name.len() + value.len() + size_of::<(String, String)>();
+    if *kept <= METADATA {
+        part.metadata.push((name, value));
+    }
+    Ok(())
+}

@@ -1,0 +1,40 @@
+//! Namespaces that are declared where an element stands.
+
+use std::sync::Arc;
+
+/// Bytes of a namespace's URI, at most.
+pub(super) const LONGEST_URI: usize = 1024;
+const XML: &str = "http://www.w3.org/XML/1998/namespace";
+/// What stands for the namespace of a prefix that is not declared; no URI.
+const UNDECLARED: &str = "undeclared";
+
+/// Prefixes and their namespaces, the inner ones last. Cheap to copy as long as nothing is declared.
+#[derive(Clone, Debug, Default)]
+pub(in super::super) struct Scopes(Arc<Vec<(Box<str>, Arc<str>)>>);
+
+impl Scopes {
+    pub(super) fn len(&self) -> usize {
+        self.0.len()
+    }
+
+    pub(super) fn declare(&mut self, prefix: &str, uri: &str) {
+        Arc::make_mut(&mut self.0).push((prefix.into(), uri.into()));
+    }
+
+    pub(super) fn truncate(&mut self, length: usize) {
+        if length < self.0.len() {
+            Arc::make_mut(&mut self.0).truncate(length);
+        }
+    }
+
+    /// The namespace of a prefix; that of no prefix is the default one.
+    pub(in super::super) fn namespace(&self, prefix: &str) -> Option<Arc<str>> {
+        let declared = self.0.iter().rev().find(|(known, _)| **known == *prefix).map(|(_, uri)| uri.clone());
+        match (declared, prefix) {
+            (Some(uri), _) => Some(uri).filter(|uri| !uri.is_empty()),
+            (None, "") => None,
+            (None, "xml") => Some(XML.into()),
+            (None, _) => Some(UNDECLARED.into()),
+        }
+    }
+}

@@ -8,6 +8,7 @@
 //! mesh is refused with the reason a person needs ("a PNG picture").
 
 mod access;
+mod amf;
 mod binary;
 mod faces;
 mod facets;
@@ -25,6 +26,7 @@ mod tail;
 mod tests;
 mod text;
 mod vertices;
+mod xml;
 
 pub use finding::{Finding, Loss};
 pub use limits::{HEADER_BYTES, MAX_TRIANGLES, PREFIX_BYTES};

@@ -197,7 +197,9 @@ fn rounding(positions: &[Position], placement: &Placement) -> Rounding {
     let of = |positions: &[Position]| {
         let mut rounding = Rounding::default();
         for position in positions {
-            placement.place(point(position)).map(|value| rounding.of_double(value));
+            for value in placement.place(point(position)) {
+                rounding.of_double(value);
+            }
         }
         rounding
     };

@@ -68,15 +68,14 @@ pub(super) fn beyond_blanks(text: &[u8], mut at: usize) -> usize {
 /// An index as its digits.
 #[inline(always)]
 pub(super) fn index(digits: &[u8]) -> Option<u32> {
-    if digits.is_empty() || digits.len() > 9 {
-        return long_index(digits);
-    }
-    digits.iter().try_fold(0, |index, byte| {
+    let short = digits.iter().try_fold(0u32, |index, byte| {
         let digit = byte.wrapping_sub(b'0');
-        (digit < 10).then_some(index * 10 + u32::from(digit))
-    })
+        (digit < 10).then_some(index.wrapping_mul(10).wrapping_add(digit.into()))
+    });
+    short.filter(|_| matches!(digits.len(), 1..=9)).or_else(|| long_index(digits))
 }
 
+/// One with a sign or many zeros, or none at all.
 #[cold]
 fn long_index(digits: &[u8]) -> Option<u32> {
     std::str::from_utf8(digits).ok()?.parse().ok()

@@ -424,24 +424,3 @@ proptest! {
         prop_assert_eq!(outcome(&bytes, 1), outcome(&bytes, 4));
     }
 }
-
-#[test]
-#[ignore = "measure"]
-fn measure() {
-    let path = std::env::var("AMF_FILE").unwrap();
-    let threads: usize = std::env::var("AMF_THREADS").unwrap().parse().unwrap();
-    let limits = Limits { threads, ..Limits::default() };
-    // SAFETY: for measuring.
-    let limits = Limits { access: unsafe { crate::contract::access::Access::mapped() }, ..limits };
-    for _ in 0..4 {
-        let start = std::time::Instant::now();
-        let file = MeshFile::open(Path::new(&path), Path::new("/tmp/w/gen-amf"), &limits, &Quiet);
-        let took = start.elapsed();
-        match file {
-            Ok(file) => eprintln!("MEASURED {path}: {} {:?} {:?} {:?}", file.records().len(), took, texts(&file), &file.output_header()[..20]),
-            Err(error) => eprintln!("MEASURED {path}: {error} {took:?}"),
-        }
-    }
-    let status = std::fs::read_to_string("/proc/self/status").unwrap();
-    eprintln!("MEASURED {:?}", status.lines().filter(|l| l.starts_with("VmHWM") || l.starts_with("RssAnon")).collect::<Vec<_>>());
-}

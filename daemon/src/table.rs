@@ -207,6 +207,7 @@ pub(crate) fn format_name(format: Format) -> &'static str {
     match format {
         Format::BinaryStl => "binary STL",
         Format::AsciiStl => "ASCII STL",
+        Format::Amf => "AMF",
         // The command line reads files only.
         _ => "no file",
     }

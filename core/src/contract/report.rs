@@ -200,6 +200,8 @@ pub enum Format {
     BinaryStl,
     /// A text STL.
     AsciiStl,
+    /// An AMF.
+    Amf,
     /// No file: a mesh that a program handed over in memory.
     Memory,
 }

@@ -52,6 +52,7 @@ pub(crate) fn target(input: Format, wanted: OutputFormat) -> Target {
 fn layout_of(format: Format) -> Option<Layout> {
     match format {
         Format::BinaryStl | Format::AsciiStl | Format::Memory => None,
+        Format::Amf => Some(Layout::Amf("millimeter")),
     }
 }
 

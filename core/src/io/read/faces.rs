@@ -83,8 +83,14 @@ impl<'v> Faces<'v> {
     /// Appends a face that is a triangle, by the indices of its vertices.
     #[inline]
     pub(super) fn triangle(&mut self, indices: [u64; 3]) {
+        self.triangle_at(indices.map(|index| self.vertices.get(index)));
+    }
+
+    /// Appends a face that is a triangle, by its corners; one without a position refers to a vertex that is not there.
+    #[inline]
+    pub(super) fn triangle_at(&mut self, corners: [Option<Point>; 3]) {
         self.tally.faces += 1;
-        match indices.map(|index| self.vertices.get(index)) {
+        match corners {
             [Some(a), Some(b), Some(c)] => self.records.push(record::encode([a, b, c], 0)),
             _ => self.astray(),
         }

@@ -20,6 +20,8 @@ const BEGINNINGS: &[(&[u8], &str)] = &[
     (b"MZ\x90", "a Windows program"),
     (b"\xff\xfe", "UTF-16 text"),
     (b"\xfe\xff", "UTF-16 text"),
+    (b"<\0?\0", "UTF-16 text"),
+    (b"\0<\0?", "UTF-16 text"),
     (b"SQLite format 3", "a database"),
     (b"version https://git-lfs", "a Git LFS pointer, not the file it stands for"),
     (b"ISO-10303-21", "a STEP model"),

@@ -8,8 +8,7 @@
 //! mesh is refused with the reason a person needs ("a PNG picture").
 
 mod access;
-// Not joined to the engine yet.
-#[allow(dead_code, unused_imports)]
+mod amf;
 mod archive;
 mod binary;
 mod faces;
@@ -19,8 +18,6 @@ mod foreign;
 mod limits;
 mod mesh_file;
 mod number;
-// Not joined to the engine yet.
-#[allow(dead_code, unused_imports)]
 mod package;
 mod polygon;
 mod rounding;
@@ -30,12 +27,8 @@ mod tail;
 #[cfg(test)]
 mod tests;
 mod text;
-// Not joined to the engine yet.
-#[allow(dead_code, unused_imports)]
 mod threemf;
 mod vertices;
-// Not joined to the engine yet.
-#[allow(dead_code, unused_imports)]
 mod xml;
 
 /// Endings of names of the formats that are read, in lower case, without a point.

@@ -3,7 +3,7 @@
 
 pub(super) use super::binary::Layout;
 use super::finding::{Finding, Rejection};
-use super::{binary, facets, foreign};
+use super::{amf, binary, facets, foreign};
 
 /// How much of a text is looked at.
 const HEAD: usize = 4096;
@@ -15,6 +15,8 @@ const HIGH_BYTES_WITHIN: usize = 1024;
 pub(super) enum Kind {
     Binary(Layout),
     Text(Text),
+    /// XML whose root is `amf`.
+    Amf,
 }
 
 /// A text STL.
@@ -26,11 +28,14 @@ pub(super) struct Text {
     pub(super) findings: Vec<Finding>,
 }
 
-/// Decides what the bytes are. In order: a binary file whose count fits its length; a text with facets; a binary file with
+/// Decides what the bytes are. In order: a binary file whose count fits its length; XML of an AMF; a text with facets; a binary file with
 /// another count whose records look like triangles; a stranger, named.
 pub(super) fn sniff(bytes: &[u8]) -> Result<Kind, Rejection> {
     if let Some(layout) = binary::exact(bytes) {
         return layout.map(Kind::Binary);
+    }
+    if amf::is_amf(bytes) {
+        return Ok(Kind::Amf);
     }
     if let Some(text) = text(bytes) {
         return Ok(Kind::Text(text));

@@ -64,7 +64,8 @@ impl<'a> Context<'a> {
         self.spool(u64::MAX)
     }
 
-    fn spool<const N: usize>(&self, most: u64) -> Result<Spool<'a, N>> {
+    /// A spool for at most so many items of `N` bytes.
+    pub(super) fn spool<const N: usize>(&self, most: u64) -> Result<Spool<'a, N>> {
         let (file, behind) = write_behind::nameless(self.spool, self.limits)?;
         Ok(Spool { folder: self.spool, path: self.path, file, behind, count: 0, most })
     }

@@ -67,8 +67,11 @@ fn cut_off(text: String) -> Finding {
     Finding { loss: Loss::Certain, ..Finding::flaw(text) }
 }
 
-/// The last solid is ended: no word of a facet follows an `endsolid`.
+/// The last solid is ended: no word of a facet follows an `endsolid`. Or the root of an AMF is.
 fn is_complete_text(end: &[u8]) -> bool {
+    if end.trim_ascii_end().ends_with(b"</amf>") {
+        return true;
+    }
     let last = |word: &[u8]| end.windows(word.len()).rposition(|at| at.eq_ignore_ascii_case(word));
     let ended = last(b"endsolid").max(last(b"end solid"));
     ended.is_some() && ended > last(b"facet").max(last(b"vertex"))

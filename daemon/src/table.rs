@@ -201,6 +201,7 @@ fn size(report: &Report) -> String {
     let format = match report.input.format {
         Format::BinaryStl => "binary STL",
         Format::AsciiStl => "ASCII STL",
+        Format::Obj => "OBJ",
         // The command line reads files only.
         _ => "no file",
     };

@@ -158,6 +158,8 @@ pub enum Format {
     BinaryStl,
     /// A text STL.
     AsciiStl,
+    /// A Wavefront OBJ.
+    Obj,
     /// No file: a mesh that a program handed over in memory.
     Memory,
 }

@@ -51,6 +51,7 @@ pub(crate) fn target(input: Format, output: &Path) -> Target {
 fn layout_of(format: Format) -> Option<Layout> {
     match format {
         Format::BinaryStl | Format::AsciiStl | Format::Memory => None,
+        Format::Obj => Some(Layout::Obj),
     }
 }
 

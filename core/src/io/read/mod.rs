@@ -16,6 +16,7 @@ mod foreign;
 mod limits;
 mod mesh_file;
 mod number;
+mod obj;
 mod polygon;
 mod rounding;
 mod sniff;

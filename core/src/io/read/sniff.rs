@@ -3,7 +3,7 @@
 
 pub(super) use super::binary::Layout;
 use super::finding::{Finding, Rejection};
-use super::{binary, facets, foreign};
+use super::{binary, facets, foreign, obj};
 
 /// How much of a text is looked at.
 const HEAD: usize = 4096;
@@ -15,6 +15,8 @@ const HIGH_BYTES_WITHIN: usize = 1024;
 pub(super) enum Kind {
     Binary(Layout),
     Text(Text),
+    /// An OBJ, and the byte of its first statement or comment.
+    Obj(usize),
 }
 
 /// A text STL.
@@ -26,7 +28,7 @@ pub(super) struct Text {
     pub(super) findings: Vec<Finding>,
 }
 
-/// Decides what the bytes are. In order: a binary file whose count fits its length; a text with facets; a binary file with
+/// Decides what the bytes are. In order: a binary file whose count fits its length; a text with facets; an OBJ; a binary file with
 /// another count whose records look like triangles; a stranger, named.
 pub(super) fn sniff(bytes: &[u8]) -> Result<Kind, Rejection> {
     if let Some(layout) = binary::exact(bytes) {
@@ -34,6 +36,9 @@ pub(super) fn sniff(bytes: &[u8]) -> Result<Kind, Rejection> {
     }
     if let Some(text) = text(bytes) {
         return Ok(Kind::Text(text));
+    }
+    if let Some(start) = obj::begins(bytes) {
+        return Ok(Kind::Obj(start));
     }
     match binary::mismatched(bytes) {
         Some(layout) => layout.map(Kind::Binary),

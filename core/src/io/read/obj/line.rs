@@ -49,11 +49,14 @@ impl<'a> Cursor<'a> {
         loop {
             let rest = self.text.get(self.at..)?;
             self.at += rest.iter().position(|&byte| !is_blank(byte))?;
-            if self.text.get(self.at) != Some(&b'#') {
-                return Some(self.rest_of_word());
+            match self.text.get(self.at) {
+                Some(b'#') => {
+                    let rest = self.text.get(self.at..)?;
+                    self.at += rest.iter().position(|&byte| is_line_end(byte)).unwrap_or(rest.len());
+                }
+                Some(b'\\') if line_end(self.text, self.at + 1) > 0 => self.at += 1,
+                _ => return Some(self.rest_of_word()),
             }
-            let rest = self.text.get(self.at..)?;
-            self.at += rest.iter().position(|&byte| is_line_end(byte)).unwrap_or(rest.len());
         }
     }
 
@@ -63,7 +66,7 @@ impl<'a> Cursor<'a> {
         let rest = self.text.get(self.at..).unwrap_or_default();
         let length = rest.iter().position(|&byte| is_blank(byte)).unwrap_or(rest.len());
         let word = rest.get(..length).unwrap_or_default();
-        let word = word.strip_suffix(b"\\").filter(|word| !word.is_empty() && line_end(rest, length) > 0).unwrap_or(word);
+        let word = word.strip_suffix(b"\\").filter(|_| line_end(rest, length) > 0).unwrap_or(word);
         self.at += word.len();
         word
     }
@@ -132,8 +135,10 @@ impl<'a> Cursor<'a> {
     pub(super) fn name(&mut self) -> &'a [u8] {
         let rest = self.text.get(self.at..).unwrap_or_default();
         let length = rest.iter().position(|&byte| is_line_end(byte)).unwrap_or(rest.len());
-        self.at += length;
-        rest.get(..length).unwrap_or_default().trim_ascii()
+        let name = rest.get(..length).unwrap_or_default();
+        let name = name.strip_suffix(b"\\").filter(|_| length < rest.len()).unwrap_or(name);
+        self.at += name.len();
+        name.trim_ascii()
     }
 
     /// Goes to the end of this line, and of those that are joined with it.

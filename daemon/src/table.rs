@@ -208,6 +208,7 @@ pub(crate) fn format_name(format: Format) -> &'static str {
         Format::BinaryStl => "binary STL",
         Format::AsciiStl => "ASCII STL",
         Format::Amf => "AMF",
+        Format::Obj => "OBJ",
         // The command line reads files only.
         _ => "no file",
     }

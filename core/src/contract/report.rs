@@ -202,6 +202,8 @@ pub enum Format {
     AsciiStl,
     /// An AMF.
     Amf,
+    /// A Wavefront OBJ.
+    Obj,
     /// No file: a mesh that a program handed over in memory.
     Memory,
 }

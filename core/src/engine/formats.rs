@@ -53,6 +53,7 @@ fn layout_of(format: Format) -> Option<Layout> {
     match format {
         Format::BinaryStl | Format::AsciiStl | Format::Memory => None,
         Format::Amf => Some(Layout::Amf("millimeter")),
+        Format::Obj => Some(Layout::Obj),
     }
 }
 

@@ -205,11 +205,11 @@ fn several_files_go_into_a_folder_under_names_of_their_own() {
 #[test]
 fn what_is_no_mesh_is_refused_in_one_line() {
     let place = Place::new();
-    let cube = "# a cube\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 1 2 4\n";
+    let cloud = "# scanned\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n";
     let strangers: [(&str, &[u8], &str); 6] = [
         ("picture.stl", b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR\0\0\x01\0\0\0\x01\0\x08\x06\0\0\0", "PNG"),
         ("empty.stl", b"", "empty"),
-        ("obj.stl", cube.as_bytes(), "OBJ"),
+        ("cloud.obj", cloud.as_bytes(), "point cloud"),
         ("page.stl", b"<!DOCTYPE html><html><body>Not found</body></html>", "web page"),
         ("zeros.stl", &[0; 4096], "no triangles"),
         ("letter.stl", b"Dear customer,\nplease find attached the part that you asked for, as STL, in millimetres, ready to be printed.\nYours faithfully, the workshop in the back yard\n", "solid"),

@@ -7,7 +7,7 @@ use crate::io::record::{self, Point, Record};
 use crate::util::words::{Count, Counted};
 
 /// Most corners of one face. Cutting a polygon takes memory and time by its corners, and no program writes such a face of a mesh.
-const MOST_CORNERS: usize = 1 << 20;
+pub(super) const MOST_CORNERS: usize = 1 << 20;
 
 /// Counts of faces, by what became of them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -78,12 +78,8 @@ fn text(head: &[u8]) -> Option<&'static str> {
         let (count, all) = lines().fold((0, 0), |(count, all), line| (count + usize::from(fits(line)), all + 1));
         all > 1 && count * 2 > all
     };
-    let obj =
-        |line: &[u8]| line.starts_with(b"v ") || line.starts_with(b"f ") || line.starts_with(b"vn ") || line.starts_with(b"#");
     let any = |begin: &[u8]| lines().any(|line| line.starts_with(begin));
-    if any(b"v ") && most(obj) {
-        Some("OBJ text")
-    } else if any(b"G1 ") || any(b"G0 ") || any(b"G28") {
+    if any(b"G1 ") || any(b"G0 ") || any(b"G28") {
         Some("G-code")
     } else if most(is_hex_dump_line) {
         Some("a hex dump")
@@ -116,14 +112,12 @@ mod tests {
 
     #[test]
     fn common_strangers_are_called_by_name() {
-        let obj = b"# made by hand\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
         let dump = b"00000000: 7374 6c20 6669 6c65 0000\n00000010: 0000 0000 0000 0000 0000\n";
         for (bytes, name) in [
             (b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR".as_slice(), "a PNG picture"),
             (b"\xff\xd8\xff\xe0\0\x10JFIF", "a JPEG picture"),
             (b"RIFF\0\0\0\0WEBPVP8 ", "a WebP picture"),
             (b"<!DOCTYPE html><html>", "a web page"),
-            (obj, "OBJ text"),
             (dump, "a hex dump"),
             (b"G28 ; home\nG1 X10 Y10\n", "G-code"),
         ] {

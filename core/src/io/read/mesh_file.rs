@@ -4,7 +4,7 @@ use super::finding::{Finding, Rejection};
 use super::limits::HEADER_BYTES;
 use super::rounding::Rounding;
 use super::spool::{Context, Items, Parsed};
-use super::{access, amf, binary, sniff, tail, text};
+use super::{access, amf, binary, obj, sniff, tail, text};
 use crate::contract::error::{Error, Result};
 use crate::contract::progress::Progress;
 use crate::contract::report::Format;
@@ -94,6 +94,12 @@ impl Content {
                 let (content, zeros) = tail::split(input);
                 let parsed = parallel::in_pool(context.limits.threads, || amf::read(content, context))?;
                 Ok(Self::parsed(parsed, Format::Amf, tail::of_text(content, zeros).into_iter().collect()))
+            }
+            sniff::Kind::Obj(start) => {
+                let _ = input.advise(memmap2::Advice::Sequential);
+                let (content, zeros) = tail::split(input);
+                let parsed = parallel::in_pool(context.limits.threads, || obj::read(content, start, context))?;
+                Ok(Self::parsed(parsed, Format::Obj, tail::of_lines(content, zeros).into_iter().collect()))
             }
         }
     }

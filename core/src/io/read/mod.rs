@@ -19,6 +19,7 @@ mod limits;
 mod mesh_file;
 mod number;
 mod package;
+mod obj;
 mod polygon;
 mod rounding;
 mod sniff;

@@ -3,7 +3,7 @@
 
 pub(super) use super::binary::Layout;
 use super::finding::{Finding, Rejection};
-use super::{amf, binary, facets, foreign};
+use super::{amf, binary, facets, foreign, obj};
 
 /// How much of a text is looked at.
 const HEAD: usize = 4096;
@@ -17,6 +17,8 @@ pub(super) enum Kind {
     Text(Text),
     /// XML whose root is `amf`.
     Amf,
+    /// An OBJ, and the byte of its first statement or comment.
+    Obj(usize),
 }
 
 /// A text STL.
@@ -28,7 +30,7 @@ pub(super) struct Text {
     pub(super) findings: Vec<Finding>,
 }
 
-/// Decides what the bytes are. In order: a binary file whose count fits its length; XML of an AMF; a text with facets; a binary file with
+/// Decides what the bytes are. In order: a binary file whose count fits its length; a format that says its name; a text with facets; an OBJ; a binary file with
 /// another count whose records look like triangles; a stranger, named.
 pub(super) fn sniff(bytes: &[u8]) -> Result<Kind, Rejection> {
     if let Some(layout) = binary::exact(bytes) {
@@ -39,6 +41,9 @@ pub(super) fn sniff(bytes: &[u8]) -> Result<Kind, Rejection> {
     }
     if let Some(text) = text(bytes) {
         return Ok(Kind::Text(text));
+    }
+    if let Some(start) = obj::begins(bytes) {
+        return Ok(Kind::Obj(start));
     }
     match binary::mismatched(bytes) {
         Some(layout) => layout.map(Kind::Binary),

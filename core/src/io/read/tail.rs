@@ -50,13 +50,22 @@ pub(super) fn of_records(records: &[Record]) -> Option<Finding> {
     })
 }
 
-/// The finding on `zeros` zero bytes behind a text.
+/// The finding on `zeros` zero bytes behind a text STL.
 pub(super) fn of_text(text: &[u8], zeros: usize) -> Option<Finding> {
+    behind(text, zeros, is_complete_text)
+}
+
+/// The finding on `zeros` zero bytes behind a text that is complete once its last line is.
+pub(super) fn of_lines(text: &[u8], zeros: usize) -> Option<Finding> {
+    behind(text, zeros, |end| end.ends_with(b"\n") || end.ends_with(b"\r"))
+}
+
+fn behind(text: &[u8], zeros: usize, is_complete: fn(&[u8]) -> bool) -> Option<Finding> {
     if zeros == 0 {
         return None;
     }
     let end = text.get(text.len().saturating_sub(BLOCK)..).unwrap_or_default();
-    Some(if zeros < BLOCK && is_complete_text(end) {
+    Some(if zeros < BLOCK && is_complete(end) {
         Finding { harmless: true, ..Finding::flaw(format!("padded with {} zero bytes", Count(zeros))) }
     } else {
         cut_off(format!("its last {} bytes are zeros, as in a file that was cut off while it was copied", Count(zeros)))

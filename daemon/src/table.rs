@@ -201,6 +201,8 @@ fn size(report: &Report) -> String {
     let format = match report.input.format {
         Format::BinaryStl => "binary STL",
         Format::AsciiStl => "ASCII STL",
+        Format::Ply => "PLY",
+        Format::Off => "OFF",
         // The command line reads files only.
         _ => "no file",
     };

@@ -158,6 +158,10 @@ pub enum Format {
     BinaryStl,
     /// A text STL.
     AsciiStl,
+    /// A PLY, as text or in binary.
+    Ply,
+    /// An OFF, as text or in binary.
+    Off,
     /// No file: a mesh that a program handed over in memory.
     Memory,
 }

@@ -51,6 +51,8 @@ pub(crate) fn target(input: Format, output: &Path) -> Target {
 fn layout_of(format: Format) -> Option<Layout> {
     match format {
         Format::BinaryStl | Format::AsciiStl | Format::Memory => None,
+        Format::Ply => Some(Layout::Ply),
+        Format::Off => Some(Layout::Off),
     }
 }
 

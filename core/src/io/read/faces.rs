@@ -7,7 +7,7 @@ use crate::io::record::{self, Point, Record};
 use crate::util::words::{Count, Counted};
 
 /// Most corners of one face. Cutting a polygon takes memory and time by its corners, and no program writes such a face of a mesh.
-const MOST_CORNERS: usize = 1 << 20;
+pub(super) const MOST_CORNERS: usize = 1 << 20;
 
 /// Counts of faces, by what became of them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -112,6 +112,12 @@ impl<'v> Faces<'v> {
                 polygon::cut(corners, |triangle| records.push(record::encode(triangle.map(at), 0)));
             }
         }
+    }
+
+    /// Counts a face whose indices are not there, or too many.
+    pub(super) fn lost(&mut self) {
+        self.tally.faces += 1;
+        self.astray();
     }
 
     /// Counts a face that was pushed, and cannot be made.

@@ -4,7 +4,7 @@ use super::finding::{Finding, Rejection};
 use super::limits::HEADER_BYTES;
 use super::rounding::Rounding;
 use super::spool::{Context, Items, Parsed};
-use super::{access, binary, sniff, tail, text};
+use super::{access, binary, off, ply, sniff, tail, text};
 use crate::contract::error::{Error, Result};
 use crate::contract::progress::Progress;
 use crate::contract::report::Format;
@@ -88,6 +88,14 @@ impl Content {
                 let parsed = parallel::in_pool(context.limits.threads, || text::read(content, start, context))?;
                 findings.extend(tail::of_text(content, zeros));
                 Ok(Self::parsed(parsed, Format::AsciiStl, findings))
+            }
+            sniff::Kind::Off => {
+                let parsed = parallel::in_pool(context.limits.threads, || off::read(input, context))?;
+                Ok(Self::parsed(parsed, Format::Off, Vec::new()))
+            }
+            sniff::Kind::Ply => {
+                let parsed = parallel::in_pool(context.limits.threads, || ply::read(input, context))?;
+                Ok(Self::parsed(parsed, Format::Ply, Vec::new()))
             }
         }
     }

@@ -9,6 +9,7 @@
 
 mod access;
 mod binary;
+mod elements;
 mod faces;
 mod facets;
 mod finding;
@@ -16,6 +17,8 @@ mod foreign;
 mod limits;
 mod mesh_file;
 mod number;
+mod off;
+mod ply;
 mod polygon;
 mod rounding;
 mod sniff;

@@ -3,7 +3,7 @@
 
 pub(super) use super::binary::Layout;
 use super::finding::{Finding, Rejection};
-use super::{binary, facets, foreign};
+use super::{binary, facets, foreign, off};
 
 /// How much of a text is looked at.
 const HEAD: usize = 4096;
@@ -15,6 +15,8 @@ const HIGH_BYTES_WITHIN: usize = 1024;
 pub(super) enum Kind {
     Binary(Layout),
     Text(Text),
+    Ply,
+    Off,
 }
 
 /// A text STL.
@@ -29,6 +31,12 @@ pub(super) struct Text {
 /// Decides what the bytes are. In order: a binary file whose count fits its length; a text with facets; a binary file with
 /// another count whose records look like triangles; a stranger, named.
 pub(super) fn sniff(bytes: &[u8]) -> Result<Kind, Rejection> {
+    if begins_ply(bytes) {
+        return Ok(Kind::Ply);
+    }
+    if off::begins(bytes) {
+        return Ok(Kind::Off);
+    }
     if let Some(layout) = binary::exact(bytes) {
         return layout.map(Kind::Binary);
     }
@@ -37,8 +45,15 @@ pub(super) fn sniff(bytes: &[u8]) -> Result<Kind, Rejection> {
     }
     match binary::mismatched(bytes) {
         Some(layout) => layout.map(Kind::Binary),
+        None if off::begins_with_counts(bytes) => Ok(Kind::Off),
         None => Err(Rejection::Unreadable(foreign::describe(bytes))),
     }
+}
+
+/// A line of `ply` alone.
+fn begins_ply(bytes: &[u8]) -> bool {
+    let line = bytes.get(..80).unwrap_or(bytes).strip_prefix(b"ply").unwrap_or_default();
+    matches!(line.iter().find(|byte| !matches!(byte, b' ' | b'\t')), Some(b'\n' | b'\r'))
 }
 
 /// Is this a text STL? After blanks and a byte order mark it begins with `solid`, and after that line's end come facets and no

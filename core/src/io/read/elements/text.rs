@@ -77,8 +77,8 @@ impl<'a> Section<'a> {
         }
         collector.keep();
         let read = self.by_lines(context, lines, collector)?;
-        // Elements that share a line look as if their numbers were other ones behind the first.
-        let fits = read.bent == 0 && (read.rows == self.rows || self.behind == Behind::Nothing);
+        // Elements that share a line look like too few, or as if their numbers were other ones behind the first.
+        let fits = read.bent == 0 && read.rows == self.rows;
         if fits || !self.fits_tokens(context, layout, read.rows == self.rows)? {
             return Ok(read);
         }

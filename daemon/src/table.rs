@@ -207,8 +207,11 @@ pub(crate) fn format_name(format: Format) -> &'static str {
     match format {
         Format::BinaryStl => "binary STL",
         Format::AsciiStl => "ASCII STL",
+        Format::ThreeMf => "3MF",
         Format::Amf => "AMF",
         Format::Obj => "OBJ",
+        Format::Ply => "PLY",
+        Format::Off => "OFF",
         // The command line reads files only.
         _ => "no file",
     }

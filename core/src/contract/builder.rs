@@ -2,7 +2,7 @@
 
 use crate::contract::loop_class::LoopClass;
 use crate::contract::ranges::ProfileError;
-use crate::contract::settings::{Bodies, Guarantee, Hollow, Limits, OutputFormat, PatchShape, Profile, Sheets, Spill};
+use crate::contract::settings::{Bodies, Guarantee, Hollow, KeepAttributes, Limits, OutputFormat, PatchShape, Profile, Sheets, Spill};
 
 /// Makes a [`Profile`].
 ///
@@ -67,6 +67,7 @@ impl ProfileBuilder {
         fill_holes: bool,
         patch_shape: PatchShape,
         format: OutputFormat,
+        attributes: KeepAttributes,
         max_volume_change: f64,
         max_area_change: f64,
         max_box_change_relative: f64,

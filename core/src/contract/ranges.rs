@@ -98,6 +98,7 @@ impl Profile {
             // Choices.
             repair: _,
             format: _,
+            attributes: _,
             leave_open: _,
             close_sheets: _,
             fill_holes: _,

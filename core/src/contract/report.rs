@@ -90,6 +90,9 @@ pub struct Report {
     /// together, and an outcome is the worst of theirs.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub objects: Vec<ObjectReport>,
+    /// What became of colours, paint and other attributes of triangles; `None` where the file has none, or its format's are not carried over.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub attributes: Option<AttributesKept>,
     /// Walls thinner than the profile's minimum; `None` if there is no minimum, or a hint says why it was not looked.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub thin_walls: Option<ThinWalls>,
@@ -97,6 +100,22 @@ pub struct Report {
     pub stages: Vec<Stage>,
     /// Where the time went and what it cost.
     pub cost: Cost,
+}
+
+/// What became of attributes, in triangles that have any.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub struct AttributesKept {
+    /// Triangles of the input that say the same of each of their places as before.
+    pub kept: u64,
+    /// Triangles of the result that are parts of others, and say the same of each place but for rounding.
+    pub divided: u64,
+    /// Those that are parts or were turned, and say it about.
+    pub approximated: u64,
+    /// New triangles, which took the attributes of most of the rim around them.
+    pub inherited: u64,
+    /// Triangles of the input that had attributes, and of which nothing is left.
+    pub lost: u64,
 }
 
 /// One object of a package.
@@ -200,10 +219,17 @@ pub enum Format {
     BinaryStl,
     /// A text STL.
     AsciiStl,
+    /// A 3MF package.
+    #[serde(rename = "3mf")]
+    ThreeMf,
     /// An AMF.
     Amf,
     /// A Wavefront OBJ.
     Obj,
+    /// A PLY, as text or in binary.
+    Ply,
+    /// An OFF, as text or in binary.
+    Off,
     /// No file: a mesh that a program handed over in memory.
     Memory,
 }
@@ -213,6 +239,11 @@ impl Format {
     pub fn ending(self) -> Option<&'static str> {
         match self {
             Self::BinaryStl | Self::AsciiStl => Some("stl"),
+            Self::ThreeMf => Some("3mf"),
+            Self::Ply => Some("ply"),
+            Self::Off => Some("off"),
+            Self::Obj => Some("obj"),
+            Self::Amf => Some("amf"),
             Self::Memory => None,
         }
     }

@@ -21,6 +21,8 @@ pub struct Profile {
     pub repair: bool,
     /// The format of the result.
     pub format: OutputFormat,
+    /// What to do where attributes of triangles would be lost: colours, paint, texture coordinates.
+    pub attributes: KeepAttributes,
     /// Boundary vertices closer than this fraction of the diagonal are one vertex. Never below what f32 can tell apart at the
     /// model's coordinates, never above [`Profile::weld_max_edge_share`] of the edges around. 0 switches the weld off.
     pub weld_relative: f64,
@@ -152,6 +154,20 @@ pub enum Hollow {
     Keep,
 }
 
+/// What to do where attributes of triangles would be lost, or hold only about.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+#[non_exhaustive]
+pub enum KeepAttributes {
+    /// A person is asked to look.
+    Keep,
+    /// They are carried over as well as they can be, and the report counts.
+    #[default]
+    Best,
+    /// Nothing is written.
+    Refuse,
+}
+
 /// The format of a result.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -238,6 +254,7 @@ impl Default for Profile {
             name: "default".into(),
             repair: true,
             format: OutputFormat::Input,
+            attributes: KeepAttributes::Best,
             weld_relative: 1e-5,
             weld_max_edge_share: 0.25,
             sew_relative: 0.01,

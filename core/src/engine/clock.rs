@@ -29,7 +29,10 @@ impl Clock {
         self.lap = Instant::now();
         self.peak_anonymous_bytes = self.peak_anonymous_bytes.max(cost::anonymous_bytes());
         tracing::debug!(stage = name, seconds, "Stage done.");
-        self.stages.push(Stage { name: name.into(), seconds });
+        match self.stages.iter_mut().find(|stage| stage.name == name) {
+            Some(stage) => stage.seconds += seconds,
+            None => self.stages.push(Stage { name: name.into(), seconds }),
+        }
     }
 
     /// Puts what was spent on a mesh of so many triangles into its report, which is complete then and can be told to anyone.

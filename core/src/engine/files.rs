@@ -18,12 +18,13 @@ use crate::engine::clock::Clock;
 use crate::engine::everywhere;
 use crate::engine::formats::{self, Target};
 use crate::engine::judging::{self, Input, Written};
+use crate::engine::package::{self, Work};
 use crate::engine::welding;
 use crate::geometry::sums::Bounds;
 use crate::io::digest;
 use crate::io::digest::Digest;
 use crate::io::disk_space::{self, Need};
-use crate::io::read::{MeshFile, PREFIX_BYTES};
+use crate::io::read::{MeshFile, PREFIX_BYTES, PackageFile};
 use crate::io::read_ahead::Guide;
 use crate::io::record::Record;
 use crate::output::edit::Edit;
@@ -48,21 +49,39 @@ pub(crate) fn inspect(input: &Path, profile: &Profile, limits: &Limits, progress
     let mut clock = Clock::start();
     judging::validate(input, profile)?;
     let limits = &limits.spooling_beside(input);
+    if PackageFile::is_package(input)
+        && let Some(package) = PackageFile::open(input, limits, progress)?
+    {
+        let report = package::inspect(&package, Work { profile, limits, progress }, &mut clock)?;
+        let triangles = report.input.triangles as usize;
+        return clock.close(report, input, triangles);
+    }
     let mesh = open(input, limits, progress)?;
     clock.stage("read");
-    disk_space::check(input, &[spool_need(mesh.records(), limits)])?;
-    let mut diagnosis = Diagnosis::of(input, mesh.records(), profile, limits, progress)?;
+    let report = look(&mesh, (profile, limits), progress, &mut clock)?;
+    clock.close(report, mesh.path(), mesh.records().len())
+}
+
+/// Diagnoses a mesh.
+pub(crate) fn look(
+    mesh: &MeshFile,
+    (profile, limits): (&Profile, &Limits),
+    progress: &dyn Progress,
+    clock: &mut Clock,
+) -> Result<Report> {
+    disk_space::check(mesh.path(), &[spool_need(mesh.records(), limits)])?;
+    let mut diagnosis = Diagnosis::of(mesh.path(), mesh.records(), profile, limits, progress)?;
     clock.stage("topology");
-    let blake3 = hash(&mesh, limits, progress);
+    let blake3 = hash(mesh, limits, progress);
     clock.stage("hash");
     mesh.check_unchanged()?;
-    let mut report = judging::begin(Task::Inspect, &subject(&mesh, blake3), &diagnosis, profile, limits);
+    let mut report = judging::begin(Task::Inspect, &subject(mesh, blake3), &diagnosis, profile, limits);
     let facts = report.input.clone();
     judging::conclude_unchanged(&mut report, &facts, mesh.findings());
     report.loops = repairs::recognise(&mut diagnosis, mesh.path(), profile, limits, progress)?;
     drop(diagnosis);
     judging::look_for_thin_walls(&mut report, &Surface { records: mesh.records(), limits, progress })?;
-    clock.close(report, mesh.path(), mesh.records().len())
+    Ok(report)
 }
 
 /// Repairs `input` into the new file `output`, in the format that the profile names.
@@ -73,6 +92,13 @@ pub(crate) fn repair(input: &Path, output: &Path, profile: &Profile, limits: &Li
     let mut clock = Clock::start();
     judging::validate(input, profile)?;
     let limits = &limits.spooling_beside(output);
+    if PackageFile::is_package(input)
+        && let Some(package) = PackageFile::open(input, limits, progress)?
+    {
+        let report = package::repair_as(&package, output, Work { profile, limits, progress }, &mut clock)?;
+        let triangles = report.input.triangles as usize;
+        return clock.close(report, input, triangles);
+    }
     let mesh = open(input, limits, progress)?;
     let triangles = mesh.records().len();
     let target = formats::target(mesh.format(), profile.format);

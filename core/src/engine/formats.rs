@@ -46,14 +46,17 @@ pub(crate) fn target(input: Format, wanted: OutputFormat) -> Target {
         OutputFormat::Obj => Some(Layout::Obj),
         OutputFormat::Amf => Some(Layout::Amf("millimeter")),
     };
-    Target { layout, is_input: layout == own }
+    Target { layout, is_input: layout == own && input != Format::ThreeMf }
 }
 
 fn layout_of(format: Format) -> Option<Layout> {
     match format {
-        Format::BinaryStl | Format::AsciiStl | Format::Memory => None,
+        // A package is written around its own text.
+        Format::BinaryStl | Format::AsciiStl | Format::ThreeMf | Format::Memory => None,
         Format::Amf => Some(Layout::Amf("millimeter")),
         Format::Obj => Some(Layout::Obj),
+        Format::Ply => Some(Layout::Ply),
+        Format::Off => Some(Layout::Off),
     }
 }
 
@@ -156,8 +159,8 @@ fn check_space(mesh: &MeshFile, output: &Path, layout: Option<Layout>, limits: &
     disk_space::check(mesh.path(), &[Need { folder, bytes, what: "the output" }])
 }
 
-/// Copies the file `input` to the new file `output`.
-fn copy(input: &Path, output: &Path, limits: &Limits, progress: &dyn Progress) -> Result<MeshFile> {
+/// Copies the file `input` to the new file `output`, and opens the copy.
+pub(crate) fn copy(input: &Path, output: &Path, limits: &Limits, progress: &dyn Progress) -> Result<MeshFile> {
     let mesh = files::open(input, limits, progress)?;
     let (written, _) = emit::draft(&mesh, output, limits, progress, |draft| draft.finish(&Content::Input))?;
     written.durable()?;

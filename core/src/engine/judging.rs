@@ -69,6 +69,7 @@ pub(crate) fn begin(task: Task, input: &Input<'_>, diagnosis: &Diagnosis<'_>, pr
         certificate: None,
         hints: Vec::new(),
         objects: Vec::new(),
+        attributes: None,
         thin_walls: None,
         stages: Vec::new(),
         cost: Cost::default(),

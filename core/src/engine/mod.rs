@@ -14,5 +14,6 @@ mod judging;
 pub(crate) mod memory;
 pub(crate) mod mesh;
 pub mod operations;
+mod package;
 mod together;
 mod welding;

@@ -17,7 +17,7 @@ use rayon::prelude::*;
 use crate::contract::error::{Error, Result};
 use crate::contract::progress::Progress;
 use crate::contract::settings::Limits;
-use crate::io::archive::{Archive, Entry};
+use crate::io::read::{Archive, Entry};
 use crate::io::write_behind::WriteBehind;
 use crate::output::emit;
 use crate::util::parallel;

@@ -112,6 +112,21 @@ impl Edit {
         self.added_from.push(from);
     }
 
+    /// The edit that changes nothing.
+    pub(crate) fn none() -> &'static Self {
+        static NONE: Edit = Edit {
+            changes: Vec::new(),
+            flipped: Vec::new(),
+            dropped: Vec::new(),
+            added: Vec::new(),
+            added_from: Vec::new(),
+            flips: 0,
+            deletions: 0,
+            max_move: 0.0,
+        };
+        &NONE
+    }
+
     /// New records, in order.
     pub(crate) fn added(&self) -> &[Record] {
         &self.added

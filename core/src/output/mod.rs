@@ -6,9 +6,11 @@
 //! **Promise:** a triangle that the edit does not name leaves as the same 50 bytes, in input order. The verdict is of the bytes that were
 //! read back, not of what should have been written.
 
+pub(crate) mod archive;
 pub(crate) mod edit;
 pub(crate) mod emit;
 pub(crate) mod encode;
 pub(crate) mod incremental;
 pub(crate) mod indexed;
+pub(crate) mod model;
 pub(crate) mod readback;

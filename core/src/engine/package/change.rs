@@ -15,11 +15,11 @@ use crate::engine::clock::Clock;
 use crate::engine::files::{self, Made};
 use crate::engine::formats::Target;
 use crate::engine::together::Section;
-use crate::io::archive::Archive;
-use crate::io::read::{MeshRecords, PackageFile, Place, slicer};
+use crate::io::read::{Archive, MeshFile, MeshRecords, PackageFile, Place, slicer};
 use crate::io::record::Record;
 use crate::io::write_behind::{self, WriteBehind};
-use crate::output::archive::{self, Durable};
+use crate::output::archive;
+use crate::output::edit::Edit;
 use crate::output::model::{self, Account, Change, MeshText, Unit};
 
 /// A new text of a part, as far as it is written.
@@ -64,8 +64,8 @@ pub(super) struct Changed {
 /// A unit that was repaired.
 struct Mended {
     made: Made,
-    /// The judged result.
-    result: crate::io::read::MeshFile,
+    /// The judged result; `None`: nothing was written, and the mesh stays as it came.
+    result: Option<MeshFile>,
     /// Holds its bytes.
     _spool: Nameless,
 }
@@ -81,7 +81,7 @@ impl<'a> Maker<'a> {
     pub(super) fn object(&mut self, place: Place, sections: &mut Vec<Section>, clock: &mut Clock) -> Result<()> {
         let read = self.package.read(place, self.work.limits, self.work.progress)?;
         clock.stage("read");
-        let units = units::of(self.package, place, &read, self.work.limits)?;
+        let units = units::of(self.package, place, &read)?;
         let mut mended = Vec::with_capacity(units.len());
         for unit in &units {
             mended.push(if unit.is_repaired { Some(self.mend(unit, &read, sections, clock)?) } else { None });
@@ -107,8 +107,7 @@ impl<'a> Maker<'a> {
         let target = Target { layout: None, is_input: true };
         let made = files::make(mesh, &spool.path, target, (profile, limits), progress, clock)?;
         sections.push(section(self.package, unit, made.report.clone(), &read.parsed.findings));
-        // Where nothing was written, the mesh stays as it came.
-        let result = if made.report.output.is_some() { files::open(&spool.path, limits, progress)? } else { made.mesh_as_it_came(limits, progress)? };
+        let result = if made.report.output.is_some() { Some(files::open(&spool.path, limits, progress)?) } else { None };
         Ok(Mended { made, result, _spool: spool })
     }
 
@@ -116,10 +115,8 @@ impl<'a> Maker<'a> {
     fn expect(&mut self, place: Place, units: &[UnitOf], mended: &[Option<Mended>], read: &MeshRecords) {
         let mut corners = super::read_back::Corners::default();
         for (unit, mended) in units.iter().zip(mended) {
-            match mended {
-                Some(mended) => corners.add(mended.result.records()),
-                None => corners.add(records_of(unit, read)),
-            }
+            let result = mended.as_ref().and_then(|mended| mended.result.as_ref());
+            corners.add(result.map_or_else(|| records_of(unit, read), MeshFile::records));
         }
         let (hash, triangles) = corners.finish();
         self.expected.push(Expected { place, hash, triangles });
@@ -188,15 +185,12 @@ impl Changed {
     }
 
     /// Writes the package to the new file `output`.
-    pub(super) fn write(&self, package: &PackageFile, output: &Path, work: Work<'_>) -> Result<Durable> {
+    pub(super) fn write(&self, package: &PackageFile, output: &Path, work: Work<'_>) -> Result<()> {
         let archive = Archive::open(package.bytes()).map_err(|rejection| rejection.at(package.path()))?;
         let replaced = |entry: usize| {
             let config = || self.config.as_ref().filter(|(own, _)| *own == entry).map(|(_, text)| text.as_slice());
             self.content.get(&entry).map(|map| &map[..]).or_else(config)
         };
-        if self.is_none() {
-            return archive::copy(package.bytes(), output, work.limits, work.progress);
-        }
         archive::write(&archive, replaced, output, work.limits, work.progress)
     }
 }
@@ -219,7 +213,7 @@ fn mesh_text<'t>(package: &'t PackageFile, place: Place, read: &'t MeshRecords) 
 }
 
 fn what_became<'u>(unit: &UnitOf, mended: Option<&'u Mended>) -> Unit<'u> {
-    let change = mended.filter(|mended| mended.made.is_written()).map(|mended| Change {
+    let change = mended.filter(|mended| mended.result.is_some()).map(|mended| Change {
         came: mended.made.mesh.as_it_came(),
         now: mended.made.mesh.records(),
         edit: &mended.made.edit,
@@ -232,7 +226,7 @@ fn what_became<'u>(unit: &UnitOf, mended: Option<&'u Mended>) -> Unit<'u> {
 fn units_as_they_are<'u>(units: &[UnitOf], read: &'u MeshRecords) -> Vec<Unit<'u>> {
     let of = |unit: &UnitOf| {
         let records = records_of(unit, read);
-        let change = unit.is_repaired.then_some(Change { came: records, now: records, edit: model::NO_EDIT });
+        let change = unit.is_repaired.then_some(Change { came: records, now: records, edit: Edit::none() });
         Unit { triangles: records.len(), change }
     };
     units.iter().map(of).collect()

@@ -14,9 +14,10 @@ use crate::contract::error::{Error, Result};
 use crate::contract::hint::HintKind;
 use crate::contract::progress::Progress;
 use crate::contract::report::{FileFacts, Format, Outcome, Report, Task};
-use crate::contract::settings::{KeepAttributes, Limits, Profile, folder_of};
+use crate::contract::settings::{KeepAttributes, Limits, OutputFormat, Profile, folder_of};
 use crate::engine::clock::Clock;
 use crate::engine::files;
+use crate::engine::formats;
 use crate::engine::judging;
 use crate::engine::together::{Section, together};
 use crate::io::disk_space::{self, Need};
@@ -24,13 +25,14 @@ use crate::io::read::PackageFile;
 use crate::output::emit;
 use crate::output::model::Account;
 use change::{Changed, Maker};
+use units::Nameless;
 
 /// Settings of a work on a package.
 #[derive(Clone, Copy)]
-pub(super) struct Work<'a> {
-    pub(super) profile: &'a Profile,
-    pub(super) limits: &'a Limits,
-    pub(super) progress: &'a dyn Progress,
+pub(crate) struct Work<'a> {
+    pub(crate) profile: &'a Profile,
+    pub(crate) limits: &'a Limits,
+    pub(crate) progress: &'a dyn Progress,
 }
 
 /// Diagnoses every object of a package, and writes nothing.
@@ -42,7 +44,7 @@ pub(crate) fn inspect(package: &PackageFile, work: Work<'_>, clock: &mut Clock) 
     for place in package.meshes() {
         let read = package.read(place, work.limits, work.progress)?;
         clock.stage("read");
-        for unit in units::of(package, place, &read, work.limits)? {
+        for unit in units::of(package, place, &read)? {
             if !unit.is_repaired {
                 continue;
             }
@@ -56,6 +58,26 @@ pub(crate) fn inspect(package: &PackageFile, work: Work<'_>, clock: &mut Clock) 
     report.task = Task::Inspect;
     report.input = facts(package, files::hash_of(package.bytes(), work.limits), report.input.triangles);
     certify(&mut report);
+    Ok(report)
+}
+
+/// Repairs every object of a package into the new file `output`, in the format that the profile names: all that is built becomes one mesh in others
+/// than 3MF.
+///
+/// # Errors
+/// [`Error`], any of them.
+pub(crate) fn repair_as(package: &PackageFile, output: &Path, work: Work<'_>, clock: &mut Clock) -> Result<Report> {
+    if work.profile.format == OutputFormat::Input {
+        return repair(package, output, work, clock);
+    }
+    let spool = Nameless::new(work.limits)?;
+    let mut report = repair(package, &spool.path, work, clock)?;
+    if report.output.is_some() {
+        let converted = formats::convert(&spool.path, output, work.profile.format, work.limits, work.progress)?;
+        clock.stage("encode");
+        report.output = Some(converted.output);
+        certify(&mut report);
+    }
     Ok(report)
 }
 
@@ -79,14 +101,17 @@ pub(crate) fn repair(package: &PackageFile, output: &Path, work: Work<'_>, clock
     report.attributes = changed.account.is_any().then(|| changed.account.told());
     let is_written = judge(package, &changed, &mut report, work.profile);
     if is_written {
-        let made = changed.write(package, output, work)?;
+        if changed.is_none() {
+            formats::copy(package.path(), output, work.limits, work.progress)?;
+        } else {
+            changed.write(package, output, work)?;
+        }
         clock.stage("pack");
         let written = read_back::confirm(package, output, &changed, work)?;
         clock.stage("read back");
         let triangles = report.after.as_ref().unwrap_or(&report.before);
         let triangles = triangles.triangles + triangles.nonfinite;
         report.output = Some(facts(&written, files::hash_of(written.bytes(), work.limits), triangles));
-        made.durable()?;
     } else {
         report.output = None;
         report.certificate = None;

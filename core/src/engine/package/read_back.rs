@@ -39,8 +39,8 @@ impl Corners {
 /// # Errors
 /// [`Error::Io`] where one is another.
 pub(super) fn confirm(package: &PackageFile, output: &Path, changed: &Changed, work: Work<'_>) -> Result<PackageFile> {
-    let written = PackageFile::open(output, work.limits, work.progress)?;
     let differs = || Error::io(output, "reading back")(std::io::Error::other("the package does not hold what was written to it"));
+    let written = PackageFile::open(output, work.limits, work.progress)?.ok_or_else(differs)?;
     let places = written.meshes();
     if places.len() != changed.expected.len() || written.bytes().is_empty() {
         return Err(differs());

@@ -27,8 +27,7 @@ pub(super) struct UnitOf {
 ///
 /// # Errors
 /// [`Error::Unreadable`] if the object's volumes are not its triangles, one volume after the other, or a triangle has no vertices.
-pub(super) fn of(package: &PackageFile, place: Place, read: &MeshRecords, limits: &Limits) -> Result<Vec<UnitOf>> {
-    let _ = limits;
+pub(super) fn of(package: &PackageFile, place: Place, read: &MeshRecords) -> Result<Vec<UnitOf>> {
     let count = read.parsed.records.all().len();
     let refuse = |reason: &str| {
         let (id, _, part) = package.names(place);

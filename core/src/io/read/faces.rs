@@ -120,6 +120,12 @@ impl<'v> Faces<'v> {
         }
     }
 
+    /// Counts a face whose indices are not there, or too many.
+    pub(super) fn lost(&mut self) {
+        self.tally.faces += 1;
+        self.astray();
+    }
+
     /// Counts a face that was pushed, and cannot be made.
     #[cold]
     fn astray(&mut self) {

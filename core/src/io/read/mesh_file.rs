@@ -1,42 +1,20 @@
 //! An open mesh file and its records.
 
-use super::finding::{Finding, Rejection};
+use super::finding::Finding;
 use super::limits::HEADER_BYTES;
+use super::opened::Opened;
 use super::rounding::Rounding;
 use super::spool::{Context, Items, Parsed};
-use super::{access, amf, binary, obj, sniff, tail, text};
-use crate::contract::error::{Error, Result};
+use super::{access, amf, binary, obj, off, ply, sniff, tail, text, unpacked};
+use crate::contract::error::Result;
 use crate::contract::progress::Progress;
 use crate::contract::report::Format;
 use crate::contract::settings::Limits;
 use crate::io::record::Record;
 use crate::util::parallel;
 use memmap2::Mmap;
-use std::fs::{File, Metadata, OpenOptions};
-use std::os::unix::fs::{MetadataExt, OpenOptionsExt};
+use std::fs::File;
 use std::path::{Path, PathBuf};
-
-/// Properties that tell one state of a file from the next.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Identity {
-    device: u64,
-    inode: u64,
-    size: u64,
-    modified: (i64, i64),
-    changed: (i64, i64),
-}
-
-impl Identity {
-    fn of(metadata: &Metadata) -> Self {
-        Self {
-            device: metadata.dev(),
-            inode: metadata.ino(),
-            size: metadata.size(),
-            modified: (metadata.mtime(), metadata.mtime_nsec()),
-            changed: (metadata.ctime(), metadata.ctime_nsec()),
-        }
-    }
-}
 
 /// Where the records of an open file lie.
 #[derive(Debug)]
@@ -52,8 +30,9 @@ enum Source {
 /// An open mesh file.
 #[derive(Debug)]
 pub struct MeshFile {
-    path: PathBuf,
-    identity: Identity,
+    opened: Opened,
+    /// As errors and reports name it.
+    name: PathBuf,
     /// Holds what `input` does, at the same places; `None` for a copy in memory.
     file: Option<File>,
     input: Mmap,
@@ -101,6 +80,18 @@ impl Content {
                 let parsed = parallel::in_pool(context.limits.threads, || obj::read(content, start, context))?;
                 Ok(Self::parsed(parsed, Format::Obj, tail::of_lines(content, zeros).into_iter().collect()))
             }
+            sniff::Kind::Archive => {
+                let (parsed, format) = parallel::in_pool(context.limits.threads, || unpacked::read(input, context))?;
+                Ok(Self::parsed(parsed, format, Vec::new()))
+            }
+            sniff::Kind::Off => {
+                let parsed = parallel::in_pool(context.limits.threads, || off::read(input, context))?;
+                Ok(Self::parsed(parsed, Format::Off, Vec::new()))
+            }
+            sniff::Kind::Ply => {
+                let parsed = parallel::in_pool(context.limits.threads, || ply::read(input, context))?;
+                Ok(Self::parsed(parsed, Format::Ply, Vec::new()))
+            }
         }
     }
 
@@ -117,22 +108,16 @@ impl MeshFile {
     /// `spool`, which should not be a memory file system; its progress is reported in bytes as stage `read`.
     ///
     /// # Errors
-    /// [`Error::Unreadable`] for what is no mesh or holds no triangle, [`Error::Refused`] beyond `MAX_TRIANGLES`,
-    /// [`Error::Changed`] if the file is truncated meanwhile, [`Error::NoSpace`] where a copy finds no room,
-    /// [`Error::Io`] where opening, mapping or spooling fails, or with [`std::io::ErrorKind::Interrupted`] when `progress`
+    /// [`crate::Error::Unreadable`] for what is no mesh or holds no triangle, [`crate::Error::Refused`] beyond `MAX_TRIANGLES`,
+    /// [`crate::Error::Changed`] if the file is truncated meanwhile, [`crate::Error::NoSpace`] where a copy finds no room,
+    /// [`crate::Error::Io`] where opening, mapping or spooling fails, or with [`std::io::ErrorKind::Interrupted`] when `progress`
     /// cancels.
     pub fn open(path: &Path, spool: &Path, limits: &Limits, progress: &dyn Progress) -> Result<Self> {
-        let (file, identity) = open_regular(path)?;
-        if identity.size == 0 {
-            return Err(Rejection::Unreadable("empty file".into()).at(path));
-        }
-        // As long as the identity says, whatever happened in between.
-        let length = usize::try_from(identity.size).map_err(|_| Rejection::TooMany.at(path))?;
-        let (input, file) = access::Foreign { path, file, length, spool, limits, progress }.bytes()?;
+        let (opened, input, file) = Opened::bytes(path, spool, limits, progress)?;
         let kind = sniff::sniff(&input).map_err(|rejection| rejection.at(path))?;
         let content = Content::of(kind, &input, &Context { path, spool, limits, progress })?;
         let Content { source, format, findings, header, rounding } = content;
-        Ok(Self { path: path.to_owned(), identity, file, input, source, format, findings, header, rounding })
+        Ok(Self { opened, name: path.to_owned(), file, input, source, format, findings, header, rounding })
     }
 
     /// The triangles in input order, those with NaN or infinite coordinates included.
@@ -201,38 +186,25 @@ impl MeshFile {
 
     /// Size of the input in bytes.
     pub fn byte_len(&self) -> u64 {
-        self.identity.size
+        self.opened.size()
     }
 
-    /// The path it was opened by.
+    /// The path it was opened by, or what it is [called](Self::called).
     pub fn path(&self) -> &Path {
-        &self.path
+        &self.name
+    }
+
+    /// The same under another name for errors and reports: of a spool, the file that its triangles are of.
+    pub(crate) fn called(self, name: &Path) -> Self {
+        Self { name: name.into(), ..self }
     }
 
     /// Fails if the path no longer leads to the file as it was when it was opened.
     ///
     /// # Errors
-    /// [`Error::Changed`] if device, inode, size, mtime or ctime differ or the file is gone; [`Error::Io`] if they cannot be
+    /// [`crate::Error::Changed`] if device, inode, size, mtime or ctime differ or the file is gone; [`crate::Error::Io`] if they cannot be
     /// read.
     pub fn check_unchanged(&self) -> Result<()> {
-        match std::fs::metadata(&self.path) {
-            Ok(metadata) if Identity::of(&metadata) == self.identity => Ok(()),
-            Ok(_) => Err(Error::Changed { path: self.path.clone() }),
-            Err(error) if error.kind() == std::io::ErrorKind::NotFound => Err(Error::Changed { path: self.path.clone() }),
-            Err(error) => Err(Error::io(&self.path, "checking")(error)),
-        }
+        self.opened.check_unchanged()
     }
-}
-
-/// Opens a regular file without ever waiting for one: a named pipe would block an ordinary open until someone writes to it.
-fn open_regular(path: &Path) -> Result<(File, Identity)> {
-    let no_wait = rustix::fs::OFlags::NONBLOCK.bits() as i32;
-    let file = OpenOptions::new().read(true).custom_flags(no_wait).open(path).map_err(Error::io(path, "opening"))?;
-    let metadata = file.metadata().map_err(Error::io(path, "opening"))?;
-    let reason = match metadata.file_type() {
-        kind if kind.is_file() => return Ok((file, Identity::of(&metadata))),
-        kind if kind.is_dir() => "a folder",
-        _ => "a pipe or device, not a file",
-    };
-    Err(Rejection::Unreadable(reason.into()).at(path))
 }

@@ -2,8 +2,9 @@
 //! with (56 of 410 files drawn from a model site, ArtOfIllusion and SolidWorks among their makers).
 
 pub(super) use super::binary::Layout;
+use super::archive::Archive;
 use super::finding::{Finding, Rejection};
-use super::{amf, binary, facets, foreign, obj};
+use super::{amf, binary, facets, foreign, obj, off};
 
 /// How much of a text is looked at.
 const HEAD: usize = 4096;
@@ -17,8 +18,12 @@ pub(super) enum Kind {
     Text(Text),
     /// XML whose root is `amf`.
     Amf,
+    /// A ZIP archive: a 3MF package, or a packed AMF.
+    Archive,
     /// An OBJ, and the byte of its first statement or comment.
     Obj(usize),
+    Ply,
+    Off,
 }
 
 /// A text STL.
@@ -33,6 +38,15 @@ pub(super) struct Text {
 /// Decides what the bytes are. In order: a binary file whose count fits its length; a format that says its name; a text with facets; an OBJ; a binary file with
 /// another count whose records look like triangles; a stranger, named.
 pub(super) fn sniff(bytes: &[u8]) -> Result<Kind, Rejection> {
+    if begins_ply(bytes) {
+        return Ok(Kind::Ply);
+    }
+    if off::begins(bytes) {
+        return Ok(Kind::Off);
+    }
+    if Archive::looks_like(bytes) {
+        return Ok(Kind::Archive);
+    }
     if let Some(layout) = binary::exact(bytes) {
         return layout.map(Kind::Binary);
     }
@@ -47,8 +61,15 @@ pub(super) fn sniff(bytes: &[u8]) -> Result<Kind, Rejection> {
     }
     match binary::mismatched(bytes) {
         Some(layout) => layout.map(Kind::Binary),
+        None if off::begins_with_counts(bytes) => Ok(Kind::Off),
         None => Err(Rejection::Unreadable(foreign::describe(bytes))),
     }
+}
+
+/// A line of `ply` alone.
+fn begins_ply(bytes: &[u8]) -> bool {
+    let line = bytes.get(..80).unwrap_or(bytes).strip_prefix(b"ply").unwrap_or_default();
+    matches!(line.iter().find(|byte| !matches!(byte, b' ' | b'\t')), Some(b'\n' | b'\r'))
 }
 
 /// Is this a text STL? After blanks and a byte order mark it begins with `solid`, and after that line's end come facets and no

@@ -5,6 +5,7 @@
 //! kernel would otherwise let a share of all memory fill with them.
 
 use std::fs::File;
+use std::io::{Seek, SeekFrom};
 use std::path::Path;
 
 use memmap2::Mmap;
@@ -129,6 +130,18 @@ impl<const N: usize> Spool<'_, N> {
             return Err(Rejection::TooMany.at(self.path));
         }
         self.behind.append(items.as_flattened()).map_err(Error::io(self.folder, "spooling"))
+    }
+
+    /// Forgets all items but the first `count`.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub(super) fn back_to(&mut self, count: u64) -> Result<()> {
+        let length = count * N as u64;
+        let cut = self.file.set_len(length).and_then(|()| (&self.file).seek(SeekFrom::Start(length)));
+        cut.map_err(Error::io(self.folder, "spooling"))?;
+        self.count = count;
+        Ok(())
     }
 
     /// So many items are in it.

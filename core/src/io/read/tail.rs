@@ -61,11 +61,24 @@ pub(super) fn of_lines(text: &[u8], zeros: usize) -> Option<Finding> {
 }
 
 fn behind(text: &[u8], zeros: usize, is_complete: fn(&[u8]) -> bool) -> Option<Finding> {
+    let end = text.get(text.len().saturating_sub(BLOCK)..).unwrap_or_default();
+    behind_text(is_complete(end), zeros)
+}
+
+/// The finding on `zeros` zero bytes at the end of rows that are all read, of which an empty one takes so many bytes.
+pub(super) fn of_rows(zeros: usize, row: usize) -> Option<Finding> {
+    (zeros >= FEWEST_RECORDS * size_of::<Record>() && zeros / row.max(1) >= FEWEST_RECORDS).then(|| {
+        let zeros = Count(zeros);
+        cut_off(format!("its faces end in {zeros} bytes of zeros, as in a file that was cut off while it was copied"))
+    })
+}
+
+/// The finding on `zeros` zero bytes behind a text, which is complete without them or not.
+pub(super) fn behind_text(complete: bool, zeros: usize) -> Option<Finding> {
     if zeros == 0 {
         return None;
     }
-    let end = text.get(text.len().saturating_sub(BLOCK)..).unwrap_or_default();
-    Some(if zeros < BLOCK && is_complete(end) {
+    Some(if zeros < BLOCK && complete {
         Finding { harmless: true, ..Finding::flaw(format!("padded with {} zero bytes", Count(zeros))) }
     } else {
         cut_off(format!("its last {} bytes are zeros, as in a file that was cut off while it was copied", Count(zeros)))

@@ -4,7 +4,7 @@ use crate::io::record::Point;
 
 /// Positions at equal steps in bytes: in a spool of them, or in the file itself.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Vertices<'a> {
+pub(crate) struct Vertices<'a> {
     bytes: &'a [u8],
     stride: usize,
     count: usize,
@@ -12,7 +12,7 @@ pub(super) struct Vertices<'a> {
 
 impl<'a> Vertices<'a> {
     /// Those of a spool.
-    pub(super) fn spooled(positions: &'a [[u8; super::spool::POSITION_BYTES]]) -> Self {
+    pub(crate) fn spooled(positions: &'a [[u8; super::spool::POSITION_BYTES]]) -> Self {
         Self { bytes: positions.as_flattened(), stride: super::spool::POSITION_BYTES, count: positions.len() }
     }
 
@@ -22,13 +22,13 @@ impl<'a> Vertices<'a> {
     }
 
     /// So many.
-    pub(super) fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.count
     }
 
     /// The position of this index, if there is one.
     #[inline]
-    pub(super) fn get(&self, index: u64) -> Option<Point> {
+    pub(crate) fn get(&self, index: u64) -> Option<Point> {
         let index = usize::try_from(index).ok().filter(|index| *index < self.count)?;
         let from = index * self.stride;
         let (words, _) = self.bytes.get(from..from + 12)?.as_chunks::<4>();

@@ -10,8 +10,6 @@
 mod elements;
 mod inherit;
 mod plan;
-#[cfg(test)]
-mod tests;
 mod votes;
 
 use std::collections::BTreeSet;
@@ -60,6 +58,12 @@ pub(crate) struct Written {
     pub(crate) account: Account,
     /// The triangles of each unit.
     pub(crate) triangles: Vec<u64>,
+}
+
+/// Does each triangle of these units refer to the vertex that [`write`] would have it refer to?
+pub(crate) fn is_numbered_once(mesh: &MeshText<'_>, units: &[Unit<'_>]) -> bool {
+    let plan = Plan::of(mesh, units);
+    mesh.elements().all(|element| plan.canonical(element.vertices) == element.vertices)
 }
 
 /// Writes the text from byte `at` on to the end of the triangles of `mesh`, which are in these units. O(n) in the triangles.

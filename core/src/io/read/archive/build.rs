@@ -7,43 +7,43 @@ use flate2::write::DeflateEncoder;
 
 /// An entry, and how its headers differ from the truth.
 #[derive(Clone, Default)]
-pub(in super::super) struct Member {
-    pub(in super::super) name: Vec<u8>,
-    pub(in super::super) content: Vec<u8>,
-    pub(in super::super) stored: bool,
+pub(crate) struct Member {
+    pub(crate) name: Vec<u8>,
+    pub(crate) content: Vec<u8>,
+    pub(crate) stored: bool,
     /// Sizes and CRC stand behind the data.
-    pub(in super::super) described: bool,
+    pub(crate) described: bool,
     /// Sizes stand in the ZIP64 extra field.
-    pub(in super::super) wide: bool,
+    pub(crate) wide: bool,
     /// Name in the local header, if it is another one.
-    pub(in super::super) local_name: Option<Vec<u8>>,
+    pub(crate) local_name: Option<Vec<u8>>,
     /// Added to the plain size in both headers.
-    pub(in super::super) more: i64,
+    pub(crate) more: i64,
     /// Added to the plain size in the local header alone.
-    pub(in super::super) local_more: i64,
-    pub(in super::super) wrong_crc: bool,
-    pub(in super::super) flags: u16,
+    pub(crate) local_more: i64,
+    pub(crate) wrong_crc: bool,
+    pub(crate) flags: u16,
     /// Method in both headers, if it is another one.
-    pub(in super::super) method: Option<u16>,
+    pub(crate) method: Option<u16>,
     /// Attributes of the central directory.
-    pub(in super::super) attributes: u32,
+    pub(crate) attributes: u32,
     /// The local header of this entry stands for it.
-    pub(in super::super) same_as: Option<usize>,
+    pub(crate) same_as: Option<usize>,
 }
 
 /// A deflated entry.
-pub(in super::super) fn member(name: &str, content: impl AsRef<[u8]>) -> Member {
+pub(crate) fn member(name: &str, content: impl AsRef<[u8]>) -> Member {
     Member { name: name.into(), content: content.as_ref().to_vec(), ..Member::default() }
 }
 
-pub(in super::super) fn deflate(content: &[u8]) -> Vec<u8> {
+pub(crate) fn deflate(content: &[u8]) -> Vec<u8> {
     let mut encoder = DeflateEncoder::new(Vec::new(), Compression::default());
     encoder.write_all(content).unwrap();
     encoder.finish().unwrap()
 }
 
 /// An archive of these, with a comment.
-pub(in super::super) fn zip(members: &[Member]) -> Vec<u8> {
+pub(crate) fn zip(members: &[Member]) -> Vec<u8> {
     let (mut bytes, mut central, mut places) = (Vec::new(), Vec::new(), Vec::new());
     for member in members {
         let place = member.same_as.map_or(bytes.len(), |of| places[of]);

@@ -26,7 +26,7 @@ impl Archive<'_> {
     ///
     /// # Errors
     /// [`Error::Unreadable`] if it is damaged, has more bytes than it claims, or more than a MiB.
-    pub(in super::super) fn small(&self, entry: &Entry, context: &Context<'_>) -> Result<Vec<u8>> {
+    pub(crate) fn small(&self, entry: &Entry, context: &Context<'_>) -> Result<Vec<u8>> {
         if entry.plain > SMALL {
             let reason = format!("has {} bytes, more than the {} that it may have", Count(entry.plain), Count(SMALL));
             return Err(refused(&entry.name, reason).at(context.path));
@@ -44,7 +44,7 @@ impl Archive<'_> {
     /// # Errors
     /// [`Error::NoSpace`] if there is no room for the bytes that the entry claims, [`Error::Unreadable`] if it is damaged or has more of them,
     /// [`Error::Io`], also when the progress cancels.
-    pub(in super::super) fn spooled(&self, entry: &Entry, context: &Context<'_>) -> Result<Items<1>> {
+    pub(crate) fn spooled(&self, entry: &Entry, context: &Context<'_>) -> Result<Items<1>> {
         context.make_room(entry.plain, "the content of the archive")?;
         let mut spool = context.text()?;
         self.unpack(entry, context, |bytes| spool.append(bytes.as_chunks().0))?;

@@ -13,16 +13,16 @@ const SIGNATURE: &[u8] = b"PK\x05\x05";
 
 /// An archive whose directory was read and checked.
 #[derive(Debug)]
-pub(in super::super) struct Archive<'a> {
-    pub(in super::super) bytes: &'a [u8],
+pub(crate) struct Archive<'a> {
+    pub(crate) bytes: &'a [u8],
     /// In the order of the central directory.
-    pub(in super::super) entries: Vec<Entry>,
+    pub(crate) entries: Vec<Entry>,
     names: Names,
 }
 
 impl<'a> Archive<'a> {
     /// `bytes` begin as a ZIP archive does: with an entry, or with the end of an archive without any.
-    pub(in super::super) fn looks_like(bytes: &[u8]) -> bool {
+    pub(crate) fn looks_like(bytes: &[u8]) -> bool {
         bytes.starts_with(b"PK\x03\x04") || bytes.starts_with(b"PK\x05\x06")
     }
 
@@ -30,7 +30,7 @@ impl<'a> Archive<'a> {
     ///
     /// # Errors
     /// A reason that names the entry.
-    pub(in super::super) fn open(bytes: &'a [u8]) -> Result<Self, Rejection> {
+    pub(crate) fn open(bytes: &'a [u8]) -> Result<Self, Rejection> {
         let directory = end::directory(bytes)?;
         let mut entries = Vec::new();
         let (mut names, mut plain, mut at) = (Names::default(), 0u64, directory.bytes.start);
@@ -70,7 +70,7 @@ impl<'a> Archive<'a> {
     }
 
     /// The entry of this name, whatever the case of its ASCII letters.
-    pub(in super::super) fn find(&self, name: &str) -> Option<&Entry> {
+    pub(crate) fn find(&self, name: &str) -> Option<&Entry> {
         self.entries.get(self.names.find(name)?)
     }
 }

@@ -24,6 +24,6 @@ mod name;
 #[cfg(test)]
 mod tests;
 
-pub(super) use entry::Entry;
-pub(super) use list::Archive;
-pub(super) use name::shown;
+pub(crate) use entry::Entry;
+pub(crate) use list::Archive;
+pub(crate) use name::shown;

@@ -10,7 +10,7 @@ const LONGEST: usize = 1024;
 const SHOWN: usize = 80;
 
 /// A name for people: control characters escaped, cut to 80 characters, in quotes.
-pub(in super::super) fn shown(name: &str) -> String {
+pub(crate) fn shown(name: &str) -> String {
     let mut text = String::from("\"");
     for (count, character) in name.chars().enumerate() {
         if count == SHOWN {

@@ -20,15 +20,15 @@ const KEYSTORE: &str = "http://schemas.microsoft.com/3dmanufacturing/2019/04/key
 const KEYSTORE_NAMESPACE: &str = "http://schemas.microsoft.com/3dmanufacturing/securecontent/2019/04";
 
 /// A package.
-pub(in super::super) struct Opc<'a> {
+pub(crate) struct Opc<'a> {
     archive: Archive<'a>,
     /// The name of the start part, as the archive has it.
-    pub(in super::super) start: String,
+    pub(crate) start: String,
     /// There are digital signatures, which no changed package keeps.
-    pub(in super::super) signed: bool,
+    pub(crate) signed: bool,
     /// Parts that are encrypted, in lower case.
     encrypted: BTreeSet<String>,
-    pub(in super::super) findings: Vec<Finding>,
+    pub(crate) findings: Vec<Finding>,
 }
 
 impl<'a> Opc<'a> {
@@ -36,7 +36,7 @@ impl<'a> Opc<'a> {
     ///
     /// # Errors
     /// Those of the archive, and [`crate::Error::Unreadable`] if there is no start part, or more than one.
-    pub(in super::super) fn open(archive: Archive<'a>, context: &Context<'_>) -> Result<Self> {
+    pub(crate) fn open(archive: Archive<'a>, context: &Context<'_>) -> Result<Self> {
         let reject = |rejection: Rejection| rejection.at(context.path);
         let mut findings = Vec::new();
         if archive.find(CONTENT_TYPES).is_none() {
@@ -54,12 +54,12 @@ impl<'a> Opc<'a> {
     }
 
     /// The entries of the archive, in its order.
-    pub(in super::super) fn entries(&self) -> &[Entry] {
+    pub(crate) fn entries(&self) -> &[Entry] {
         &self.archive.entries
     }
 
     /// The relationships of a part, none if it has none.
-    pub(in super::super) fn relationships(&mut self, part: &str, context: &Context<'_>) -> Result<Vec<Relationship>> {
+    pub(crate) fn relationships(&mut self, part: &str, context: &Context<'_>) -> Result<Vec<Relationship>> {
         let found = relationships(&self.archive, part, context)?;
         self.note_encrypted(part, &found);
         Ok(found)
@@ -69,7 +69,7 @@ impl<'a> Opc<'a> {
     ///
     /// # Errors
     /// [`crate::Error::Unreadable`] if it is not there or encrypted; those of [`Archive::spooled`].
-    pub(in super::super) fn spooled(&self, part: &str, context: &Context<'_>) -> Result<Items<1>> {
+    pub(crate) fn spooled(&self, part: &str, context: &Context<'_>) -> Result<Items<1>> {
         let refuse = |reason: &str| Rejection::Unreadable(format!("the part {} {reason}", shown(part))).at(context.path);
         if self.encrypted.contains(&part.to_ascii_lowercase()) {
             return Err(refuse("is encrypted (3MF Secure Content)"));
@@ -79,7 +79,7 @@ impl<'a> Opc<'a> {
     }
 
     /// The name of a part as the archive has it, if it is there.
-    pub(in super::super) fn name_of(&self, part: &str) -> Option<&str> {
+    pub(crate) fn name_of(&self, part: &str) -> Option<&str> {
         self.archive.find(part).filter(|entry| !entry.is_folder()).map(|entry| entry.name.as_str())
     }
 

@@ -2,7 +2,7 @@
 
 /// The name of the part that `target` leads to from the part `source`: without a slash before it, as an archive has it. `None` if it leads out of
 /// the package, or is no name.
-pub(in super::super) fn resolve(source: &str, target: &str) -> Option<String> {
+pub(crate) fn resolve(source: &str, target: &str) -> Option<String> {
     let target = target.split(['#', '?']).next().unwrap_or_default();
     let (folder, path) = match target.strip_prefix('/') {
         Some(path) => ("", path),

@@ -9,13 +9,13 @@ const MOST: usize = 65_536;
 
 /// One relationship.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(in super::super) struct Relationship {
+pub(crate) struct Relationship {
     /// A URI.
-    pub(in super::super) kind: String,
+    pub(crate) kind: String,
     /// The target as it stands.
-    pub(in super::super) target: String,
+    pub(crate) target: String,
     /// It leads out of the package.
-    pub(in super::super) external: bool,
+    pub(crate) external: bool,
 }
 
 /// Reads a part of relationships. Memory: that of the part.

@@ -92,7 +92,7 @@ impl Model {
     }
 
     /// Calls `each` for every object without components of a build item, with its transform, in order. A build that was checked has an end.
-    pub(in super::super) fn instances(&self, item: &Item, mut each: impl FnMut(Place, &Transform)) {
+    pub(crate) fn instances(&self, item: &Item, mut each: impl FnMut(Place, &Transform)) {
         let Some(root) = self.target(0, &item.component) else { return };
         let mut stack = vec![Level { place: root, transform: item.component.transform, next: 0 }];
         while let Some(level) = stack.last_mut() {

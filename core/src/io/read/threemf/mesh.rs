@@ -22,16 +22,23 @@ const TEXT_EACH: usize = 40;
 
 /// A mesh that was read.
 #[derive(Debug)]
-pub(in super::super) struct MeshRecords {
-    pub(in super::super) parsed: Parsed,
+pub(crate) struct MeshRecords {
+    pub(crate) parsed: Parsed,
     /// The positions that the file has, in its order.
-    pub(in super::super) positions: Items<POSITION_BYTES>,
+    pub(crate) positions: Items<POSITION_BYTES>,
     /// Triangles that the file has, with those that were left out.
-    pub(in super::super) triangles: u64,
+    pub(crate) triangles: u64,
     /// Triangles with properties of their own.
-    pub(in super::super) with_property: u64,
+    pub(crate) with_property: u64,
     /// Triangles with attributes of vendors.
-    pub(in super::super) with_vendor: u64,
+    pub(crate) with_vendor: u64,
+}
+
+impl MeshRecords {
+    /// The positions, by the numbers that triangles have for them.
+    pub(crate) fn vertices(&self) -> Vertices<'_> {
+        Vertices::spooled(self.positions.all())
+    }
 }
 
 /// Triangles of a window: their records, and what is told of them.
@@ -43,7 +50,7 @@ impl Model {
     /// # Errors
     /// [`crate::Error::Unreadable`] if it has no mesh, or something besides triangles, or if most of it is damaged;
     /// [`crate::Error::Refused`] for too many triangles, [`crate::Error::NoSpace`], [`crate::Error::Io`].
-    pub(in super::super) fn records(&self, place: Place, context: &Context<'_>) -> Result<MeshRecords> {
+    pub(crate) fn records(&self, place: Place, context: &Context<'_>) -> Result<MeshRecords> {
         let refuse = |reason: String| self.refuse(place, reason).at(context.path);
         let object = self.parts.get(place.part).and_then(|part| Some((part, part.objects.get(place.object)?)));
         let Some((part, object)) = object else { return Err(refuse("is not there".into())) };

@@ -24,7 +24,9 @@ mod scan;
 mod shards;
 #[cfg(test)]
 mod tests;
+pub(crate) mod slicer;
 mod transform;
 
-pub(super) use mesh::MeshRecords;
-pub(super) use model::Model;
+pub(crate) use mesh::MeshRecords;
+pub(crate) use model::{Content, Model, Object, Place, Purpose};
+pub(crate) use transform::Transform;

@@ -11,7 +11,7 @@ use super::transform::Transform;
 
 /// The unit of all coordinates of a part (3MF Core 3.3).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(in super::super) enum Unit {
+pub(crate) enum Unit {
     Micron,
     Millimeter,
     Centimeter,
@@ -22,7 +22,7 @@ pub(in super::super) enum Unit {
 
 /// What an object is for (3MF Core 4).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(in super::super) enum Purpose {
+pub(crate) enum Purpose {
     Model,
     SolidSupport,
     Support,
@@ -32,16 +32,16 @@ pub(in super::super) enum Purpose {
 
 /// A part of the archive that holds a model.
 #[derive(Debug)]
-pub(in super::super) struct Part {
+pub(crate) struct Part {
     /// As the archive has it.
-    pub(in super::super) name: String,
+    pub(crate) name: String,
     /// The text of the part, all of it.
-    pub(in super::super) text: Items<1>,
-    pub(in super::super) unit: Unit,
+    pub(crate) text: Items<1>,
+    pub(crate) unit: Unit,
     /// Names and values of the model's metadata.
-    pub(in super::super) metadata: Vec<(String, String)>,
+    pub(crate) metadata: Vec<(String, String)>,
     /// In the order of the part.
-    pub(in super::super) objects: Vec<Object>,
+    pub(crate) objects: Vec<Object>,
     /// The objects by their ids.
     pub(super) by_id: HashMap<u32, usize>,
     /// The items of its build, which count in the first part alone.
@@ -49,30 +49,30 @@ pub(in super::super) struct Part {
 }
 
 impl Part {
-    pub(in super::super) fn text(&self) -> &[u8] {
+    pub(crate) fn text(&self) -> &[u8] {
         self.text.all().as_flattened()
     }
 }
 
 /// An object.
 #[derive(Clone, Debug)]
-pub(in super::super) struct Object {
-    pub(in super::super) id: u32,
-    pub(in super::super) purpose: Purpose,
-    pub(in super::super) name: String,
-    pub(in super::super) part_number: String,
-    pub(in super::super) uuid: String,
-    pub(in super::super) thumbnail: String,
+pub(crate) struct Object {
+    pub(crate) id: u32,
+    pub(crate) purpose: Purpose,
+    pub(crate) name: String,
+    pub(crate) part_number: String,
+    pub(crate) uuid: String,
+    pub(crate) thumbnail: String,
     /// `pid` and `pindex`, as they stand.
-    pub(in super::super) property: [Option<u32>; 2],
+    pub(crate) property: [Option<u32>; 2],
     /// Where `<object …>…</object>` stands in the part.
-    pub(in super::super) whole: Range<usize>,
-    pub(in super::super) content: Content,
+    pub(crate) whole: Range<usize>,
+    pub(crate) content: Content,
 }
 
 /// What an object is made of.
 #[derive(Clone, Debug)]
-pub(in super::super) enum Content {
+pub(crate) enum Content {
     Mesh(Mesh),
     Components(Vec<Component>),
     /// Something without triangles, in words.
@@ -83,22 +83,22 @@ pub(in super::super) enum Content {
 
 /// A mesh, where it stands.
 #[derive(Clone, Debug)]
-pub(in super::super) struct Mesh {
+pub(crate) struct Mesh {
     /// `<mesh>…</mesh>` in the part.
-    pub(in super::super) whole: Range<usize>,
-    pub(in super::super) vertices: Region,
-    pub(in super::super) triangles: Region,
+    pub(crate) whole: Range<usize>,
+    pub(crate) vertices: Region,
+    pub(crate) triangles: Region,
     /// It has a beam lattice, so that the triangles are not all of it.
-    pub(in super::super) lattice: bool,
+    pub(crate) lattice: bool,
 }
 
 /// An element that holds vertices or triangles.
 #[derive(Clone, Debug, Default)]
-pub(in super::super) struct Region {
+pub(crate) struct Region {
     /// From its start tag to its end tag, both included.
-    pub(in super::super) whole: Range<usize>,
+    pub(crate) whole: Range<usize>,
     /// What lies between them.
-    pub(in super::super) inner: Range<usize>,
+    pub(crate) inner: Range<usize>,
     /// Nothing but elements without content lies between them.
     pub(super) plain: bool,
     /// The prefix of its name, with the colon.
@@ -109,61 +109,61 @@ pub(in super::super) struct Region {
 
 /// Another object as a part of one.
 #[derive(Clone, Debug)]
-pub(in super::super) struct Component {
-    pub(in super::super) object: u32,
+pub(crate) struct Component {
+    pub(crate) object: u32,
     /// The part that holds the object, if it is not this one.
-    pub(in super::super) path: Option<String>,
-    pub(in super::super) transform: Transform,
+    pub(crate) path: Option<String>,
+    pub(crate) transform: Transform,
 }
 
 /// An object that is to be built.
 #[derive(Clone, Debug)]
-pub(in super::super) struct Item {
-    pub(in super::super) component: Component,
-    pub(in super::super) printable: bool,
-    pub(in super::super) part_number: String,
-    pub(in super::super) uuid: String,
+pub(crate) struct Item {
+    pub(crate) component: Component,
+    pub(crate) printable: bool,
+    pub(crate) part_number: String,
+    pub(crate) uuid: String,
     /// Where its tag stands in the first part.
-    pub(in super::super) tag: Range<usize>,
+    pub(crate) tag: Range<usize>,
 }
 
 /// An object of a model: the number of its part, and its number in it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub(in super::super) struct Place {
-    pub(in super::super) part: usize,
-    pub(in super::super) object: usize,
+pub(crate) struct Place {
+    pub(crate) part: usize,
+    pub(crate) object: usize,
 }
 
 /// All models of a package.
 #[derive(Debug)]
-pub(in super::super) struct Model {
+pub(crate) struct Model {
     /// The entries of the archive, in its order.
-    pub(in super::super) entries: Vec<Entry>,
+    pub(crate) entries: Vec<Entry>,
     /// The start part, then those that it leads to.
-    pub(in super::super) parts: Vec<Part>,
+    pub(crate) parts: Vec<Part>,
     /// Parts by their names in lower case.
     pub(super) by_name: HashMap<String, usize>,
-    pub(in super::super) signed: bool,
-    pub(in super::super) findings: Vec<Finding>,
+    pub(crate) signed: bool,
+    pub(crate) findings: Vec<Finding>,
 }
 
 impl Model {
     /// What is to be built, in order.
-    pub(in super::super) fn items(&self) -> &[Item] {
+    pub(crate) fn items(&self) -> &[Item] {
         self.parts.first().map_or(&[], |part| part.items.as_slice())
     }
 
     /// The unit of the whole.
-    pub(in super::super) fn unit(&self) -> Unit {
+    pub(crate) fn unit(&self) -> Unit {
         self.parts.first().map_or(Unit::Millimeter, |part| part.unit)
     }
 
-    pub(in super::super) fn object(&self, place: Place) -> Option<&Object> {
+    pub(crate) fn object(&self, place: Place) -> Option<&Object> {
         self.parts.get(place.part)?.objects.get(place.object)
     }
 
     /// The object that a component of this part refers to, if it is there.
-    pub(in super::super) fn target(&self, part: usize, component: &Component) -> Option<Place> {
+    pub(crate) fn target(&self, part: usize, component: &Component) -> Option<Place> {
         let part = match &component.path {
             None => part,
             Some(path) => *self.by_name.get(&path.to_ascii_lowercase())?,

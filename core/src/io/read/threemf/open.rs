@@ -16,7 +16,7 @@ impl Model {
     ///
     /// # Errors
     /// [`crate::Error::Unreadable`] with a reason that names the entry, the part or the object; [`crate::Error::NoSpace`], [`crate::Error::Io`].
-    pub(in super::super) fn open(bytes: &[u8], context: &Context<'_>) -> Result<Self> {
+    pub(crate) fn open(bytes: &[u8], context: &Context<'_>) -> Result<Self> {
         let reject = |rejection: Rejection| rejection.at(context.path);
         let archive = Archive::open(bytes).map_err(reject)?;
         let mut package = Opc::open(archive, context)?;

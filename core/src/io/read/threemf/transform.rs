@@ -4,17 +4,17 @@ use super::super::number::{is_blank, number};
 
 /// Four rows of three: x, y and z go where the first three rows say, the origin to the fourth.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(in super::super) struct Transform(pub(in super::super) [[f64; 3]; 4]);
+pub(crate) struct Transform(pub(crate) [[f64; 3]; 4]);
 
 /// A determinant below this part of the product of its rows' lengths flattens whatever it is applied to.
 const FLAT: f64 = 1e-12;
 
 impl Transform {
     /// It leaves all where it is.
-    pub(in super::super) const IDENTITY: Self = Self([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.0, 0.0, 0.0]]);
+    pub(crate) const IDENTITY: Self = Self([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.0, 0.0, 0.0]]);
 
     /// Twelve numbers between blanks, as `m00 m01 m02 m10 … m32`. `None` if it is anything else.
-    pub(in super::super) fn parse(text: &str) -> Option<Self> {
+    pub(crate) fn parse(text: &str) -> Option<Self> {
         let mut values = [[0.0; 3]; 4];
         let mut tokens = text.as_bytes().split(|byte| is_blank(*byte)).filter(|token| !token.is_empty());
         for value in values.as_flattened_mut() {
@@ -24,7 +24,7 @@ impl Transform {
     }
 
     /// This one first, and then the other.
-    pub(in super::super) fn then(&self, other: &Self) -> Self {
+    pub(crate) fn then(&self, other: &Self) -> Self {
         let Self([x, y, z, origin]) = *self;
         let [ox, oy, oz, _] = Self::linear(other);
         let turned = |row: [f64; 3]| [0, 1, 2].map(|at: usize| row[0] * ox[at] + row[1] * oy[at] + row[2] * oz[at]);
@@ -36,27 +36,32 @@ impl Transform {
     }
 
     /// Where a point goes.
-    pub(in super::super) fn apply(&self, point: [f64; 3]) -> [f64; 3] {
+    pub(crate) fn apply(&self, point: [f64; 3]) -> [f64; 3] {
         let Self([x, y, z, origin]) = self;
         [0, 1, 2].map(|at: usize| point[0] * x[at] + point[1] * y[at] + point[2] * z[at] + origin[at])
     }
 
     /// Volumes grow by so much; less than zero if left becomes right.
-    pub(in super::super) fn determinant(&self) -> f64 {
+    pub(crate) fn determinant(&self) -> f64 {
         let [a, b, c, _] = self.0;
         a[0] * (b[1] * c[2] - b[2] * c[1]) - a[1] * (b[0] * c[2] - b[2] * c[0]) + a[2] * (b[0] * c[1] - b[1] * c[0])
     }
 
     /// Nothing solid is left of what it is applied to.
-    pub(in super::super) fn flattens(&self) -> bool {
+    pub(crate) fn flattens(&self) -> bool {
         let [a, b, c, _] = self.0;
         let size: f64 = [a, b, c].iter().map(|row| row.iter().map(|v| v * v).sum::<f64>().sqrt()).product();
         let determinant = self.determinant();
         !(determinant.is_finite() && determinant.abs() > FLAT * size)
     }
 
+    /// It leaves all where it is.
+    pub(crate) fn is_identity(&self) -> bool {
+        *self == Self::IDENTITY
+    }
+
     /// Left becomes right.
-    pub(in super::super) fn mirrors(&self) -> bool {
+    pub(crate) fn mirrors(&self) -> bool {
         self.determinant() < 0.0
     }
 }

@@ -24,17 +24,17 @@ struct Attribute<'a> {
 
 /// The start of an element.
 #[derive(Clone, Debug)]
-pub(in super::super) struct Element<'a> {
+pub(crate) struct Element<'a> {
     /// The namespace's URI, if there is one.
-    pub(in super::super) namespace: Option<Arc<str>>,
+    pub(crate) namespace: Option<Arc<str>>,
     /// The name with its prefix, as it stands.
-    pub(in super::super) raw_name: &'a str,
+    pub(crate) raw_name: &'a str,
     /// The name without its prefix.
-    pub(in super::super) name: &'a str,
+    pub(crate) name: &'a str,
     /// Where its start tag stands in the part.
-    pub(in super::super) tag: Range<usize>,
+    pub(crate) tag: Range<usize>,
     /// It is a tag of its own, without content.
-    pub(in super::super) empty: bool,
+    pub(crate) empty: bool,
     attributes: Vec<Attribute<'a>>,
 }
 
@@ -79,17 +79,17 @@ impl<'a> Element<'a> {
     }
 
     /// This element of this namespace.
-    pub(in super::super) fn is(&self, namespace: &str, name: &str) -> bool {
+    pub(crate) fn is(&self, namespace: &str, name: &str) -> bool {
         self.name == name && self.namespace.as_deref() == Some(namespace)
     }
 
     /// The value of an attribute without a prefix. An error says what is wrong with it.
-    pub(in super::super) fn plain(&self, name: &str) -> Result<Option<Cow<'a, str>>, String> {
+    pub(crate) fn plain(&self, name: &str) -> Result<Option<Cow<'a, str>>, String> {
         self.value(None, name)
     }
 
     /// The value of an attribute of this namespace.
-    pub(in super::super) fn of(&self, namespace: &str, name: &str) -> Result<Option<Cow<'a, str>>, String> {
+    pub(crate) fn of(&self, namespace: &str, name: &str) -> Result<Option<Cow<'a, str>>, String> {
         self.value(Some(namespace), name)
     }
 
@@ -103,12 +103,12 @@ impl<'a> Element<'a> {
     }
 
     /// There is an attribute of this name without a prefix.
-    pub(in super::super) fn has(&self, name: &str) -> bool {
+    pub(crate) fn has(&self, name: &str) -> bool {
         self.attributes.iter().any(|a| a.name == name && a.namespace.is_none())
     }
 
     /// An attribute without a prefix, or with one, besides these without one.
-    pub(in super::super) fn has_others_than(&self, names: &[&str]) -> bool {
+    pub(crate) fn has_others_than(&self, names: &[&str]) -> bool {
         self.attributes.iter().any(|a| a.namespace.is_some() || !names.contains(&a.name))
     }
 }

@@ -19,7 +19,7 @@ const BOM: &[u8] = b"\xef\xbb\xbf";
 
 /// What stands next.
 #[derive(Debug)]
-pub(in super::super) enum Node<'a> {
+pub(crate) enum Node<'a> {
     Start(Element<'a>),
     /// The end of the innermost open element; its end tag stands there.
     End(Range<usize>),
@@ -37,7 +37,7 @@ struct Open<'a> {
 }
 
 /// Pulls what a part holds.
-pub(in super::super) struct Xml<'a> {
+pub(crate) struct Xml<'a> {
     part: &'a str,
     text: &'a [u8],
     /// Where the reader began.
@@ -56,7 +56,7 @@ impl<'a> Xml<'a> {
     ///
     /// # Errors
     /// Another encoding than UTF-8.
-    pub(in super::super) fn of(part: &'a str, text: &'a [u8]) -> Result<Self, Rejection> {
+    pub(crate) fn of(part: &'a str, text: &'a [u8]) -> Result<Self, Rejection> {
         let utf16 = [b"\xff\xfe".as_slice(), b"\xfe\xff", b"<\0", b"\0<"];
         if utf16.iter().any(|mark| text.starts_with(mark)) {
             return Err(refused(part, "is UTF-16, which is not read; UTF-8 is"));
@@ -66,7 +66,7 @@ impl<'a> Xml<'a> {
     }
 
     /// Of a piece of a part that stands within these namespaces: what lies between two bytes of `text`, and may hold several elements and any text.
-    pub(in super::super) fn within(part: &'a str, text: &'a [u8], piece: Range<usize>, scopes: Scopes) -> Self {
+    pub(crate) fn within(part: &'a str, text: &'a [u8], piece: Range<usize>, scopes: Scopes) -> Self {
         let text = text.get(..piece.end).unwrap_or(text);
         Self { piece: true, ..Self::at(part, text, piece.start, scopes) }
     }
@@ -85,22 +85,22 @@ impl<'a> Xml<'a> {
     }
 
     /// Where the reading stands in the part: behind the tag that was told of last.
-    pub(in super::super) fn position(&self) -> usize {
+    pub(crate) fn position(&self) -> usize {
         self.base.saturating_add(usize::try_from(self.reader.buffer_position()).unwrap_or(usize::MAX)).min(self.text.len())
     }
 
     /// The namespaces that are declared here.
-    pub(in super::super) fn scopes(&self) -> &Scopes {
+    pub(crate) fn scopes(&self) -> &Scopes {
         &self.scopes
     }
 
     /// A refusal of the part.
-    pub(in super::super) fn refuse(&self, reason: impl std::fmt::Display) -> Rejection {
+    pub(crate) fn refuse(&self, reason: impl std::fmt::Display) -> Rejection {
         refused(self.part, reason)
     }
 
     /// A refusal of the part, for an element of it.
-    pub(in super::super) fn refuse_element(&self, element: &Element<'_>, reason: impl std::fmt::Display) -> Rejection {
+    pub(crate) fn refuse_element(&self, element: &Element<'_>, reason: impl std::fmt::Display) -> Rejection {
         self.refuse(format!("is damaged: <{}> at byte {} {reason}", element.name, Count(element.tag.start)))
     }
 
@@ -109,12 +109,12 @@ impl<'a> Xml<'a> {
     }
 
     /// What stands next.
-    pub(in super::super) fn next(&mut self) -> Result<Node<'a>, Rejection> {
+    pub(crate) fn next(&mut self) -> Result<Node<'a>, Rejection> {
         self.step(true)
     }
 
     /// The next element in the one that is open, or `None` at its end. Text between them is left out.
-    pub(in super::super) fn child(&mut self) -> Result<Option<Element<'a>>, Rejection> {
+    pub(crate) fn child(&mut self) -> Result<Option<Element<'a>>, Rejection> {
         loop {
             match self.next()? {
                 Node::Start(element) => return Ok(Some(element)),
@@ -125,7 +125,7 @@ impl<'a> Xml<'a> {
     }
 
     /// Leaves out the rest of the innermost open element; gives where its end tag stands. Attributes are not looked at.
-    pub(in super::super) fn skip(&mut self) -> Result<Range<usize>, Rejection> {
+    pub(crate) fn skip(&mut self) -> Result<Range<usize>, Rejection> {
         let depth = self.open.len();
         loop {
             match self.step(false)? {
@@ -138,7 +138,7 @@ impl<'a> Xml<'a> {
 
     /// Leaves out the rest of the open element up to the next end tag, if that is its own and nothing but elements without content lies before it.
     /// `None`, and nothing is left out, if not. Gives where the end tag stands.
-    pub(in super::super) fn skip_plain(&mut self) -> Option<Range<usize>> {
+    pub(crate) fn skip_plain(&mut self) -> Option<Range<usize>> {
         if self.ends {
             return None;
         }

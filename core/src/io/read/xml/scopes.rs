@@ -10,7 +10,7 @@ const UNDECLARED: &str = "undeclared";
 
 /// Prefixes and their namespaces, the inner ones last. Cheap to copy as long as nothing is declared.
 #[derive(Clone, Debug, Default)]
-pub(in super::super) struct Scopes(Arc<Vec<(Box<str>, Arc<str>)>>);
+pub(crate) struct Scopes(Arc<Vec<(Box<str>, Arc<str>)>>);
 
 impl Scopes {
     pub(super) fn len(&self) -> usize {
@@ -28,7 +28,7 @@ impl Scopes {
     }
 
     /// The namespace of a prefix; that of no prefix is the default one.
-    pub(in super::super) fn namespace(&self, prefix: &str) -> Option<Arc<str>> {
+    pub(crate) fn namespace(&self, prefix: &str) -> Option<Arc<str>> {
         let declared = self.0.iter().rev().find(|(known, _)| **known == *prefix).map(|(_, uri)| uri.clone());
         match (declared, prefix) {
             (Some(uri), _) => Some(uri).filter(|uri| !uri.is_empty()),

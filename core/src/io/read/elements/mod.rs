@@ -1,0 +1,14 @@
+//! Vertices and faces as rows of numbers, text or binary: what PLY and OFF have in common.
+//!
+//! **In:** a place in a file, how many rows the header announces there, and the [`layout::Layout`] of a row.
+//! **Out:** positions or records in their spools, how many rows were there, and where they end.
+//! **Promise:** memory for a few pieces of the file, whatever counts it claims; the same result for any number of threads.
+
+pub(super) mod cursor;
+pub(super) mod layout;
+pub(super) mod lines;
+pub(super) mod packed;
+pub(super) mod points;
+pub(super) mod polygons;
+pub(super) mod strips;
+pub(super) mod text;

@@ -1,0 +1,238 @@
+//! An open 3MF package: its objects, read when they are asked for.
+
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+use memmap2::Mmap;
+
+use super::archive::Archive;
+use super::binary;
+use super::finding::{Finding, Rejection};
+use super::opened::Opened;
+use super::rounding::Rounding;
+use super::spool::{Context, Parsed};
+use super::threemf::slicer::{self, Volume};
+use super::threemf::{Content, MeshRecords, Model, Object, Place, Purpose};
+use crate::contract::error::Result;
+use crate::contract::progress::Progress;
+use crate::contract::settings::Limits;
+use crate::io::record::{self, Record};
+use crate::util::parallel;
+use crate::util::words::Counted;
+
+/// The part that every package has.
+pub(super) const CONTENT_TYPES: &str = "[Content_Types].xml";
+/// Records that are placed at once.
+const PLACED: usize = 16 << 10;
+
+/// An open package.
+pub(crate) struct PackageFile {
+    opened: Opened,
+    path: PathBuf,
+    input: Mmap,
+    model: Model,
+    /// The part of a slicer's project that says which triangles are volumes: the number of its entry, and its text.
+    config: Option<(usize, Vec<u8>)>,
+    volumes: Vec<Volume>,
+    findings: Vec<Finding>,
+}
+
+impl PackageFile {
+    /// Does the file begin as an archive that holds a 3MF does? A file that cannot be read does not.
+    pub(crate) fn is_package(path: &Path) -> bool {
+        use std::io::Read;
+        let mut head = [0; 4];
+        // A pipe would block; no regular file does.
+        let is_file = std::fs::metadata(path).is_ok_and(|metadata| metadata.is_file());
+        is_file && std::fs::File::open(path).and_then(|mut file| file.read_exact(&mut head)).is_ok() && head == *b"PK\x03\x04"
+    }
+
+    /// Opens a package; `None`: the archive is none. O(text) in its models; each is unpacked into a spool.
+    ///
+    /// # Errors
+    /// [`crate::Error`] of reading, with a reason that names the entry, the part or the object.
+    pub(crate) fn open(path: &Path, limits: &Limits, progress: &dyn Progress) -> Result<Option<Self>> {
+        let spool = limits.spool_folder();
+        let (opened, input, _) = Opened::bytes(path, &spool, limits, progress)?;
+        let context = Context { path, spool: &spool, limits, progress };
+        let reject = |rejection: Rejection| rejection.at(path);
+        let archive = Archive::open(&input).map_err(reject)?;
+        if archive.find(CONTENT_TYPES).is_none() {
+            return Ok(None);
+        }
+        let model = parallel::in_pool(limits.threads, || Model::open(&input, &context))?;
+        let entry = archive.entries.iter().position(|entry| entry.name == slicer::CONFIG);
+        let config = match entry.and_then(|number| Some((number, archive.entries.get(number)?))) {
+            Some((number, entry)) => Some((number, archive.small(entry, &context)?)),
+            None => None,
+        };
+        let volumes = config.as_ref().map_or(Ok(Vec::new()), |(_, text)| slicer::volumes(text)).map_err(reject)?;
+        let findings = [model.findings.clone(), left_alone(&model)].concat();
+        Ok(Some(Self { opened, path: path.to_owned(), input, model, config, volumes, findings }))
+    }
+
+    /// The objects that are repaired: meshes of triangles that are printed, in the order of the parts and of their texts.
+    pub(crate) fn meshes(&self) -> Vec<Place> {
+        places(&self.model).filter(|(_, object)| is_repaired(object)).map(|(place, _)| place).collect()
+    }
+
+    /// Reads an object's mesh. O(text).
+    ///
+    /// # Errors
+    /// As [`PackageFile::open`].
+    pub(crate) fn read(&self, place: Place, limits: &Limits, progress: &dyn Progress) -> Result<MeshRecords> {
+        let spool = limits.spool_folder();
+        let context = Context { path: &self.path, spool: &spool, limits, progress };
+        parallel::in_pool(limits.threads, || self.model.records(place, &context))
+    }
+
+    /// The number and the name of an object, and the name of its part.
+    pub(crate) fn names(&self, place: Place) -> (u32, String, String) {
+        let part = self.model.parts.get(place.part).map(|part| part.name.clone()).unwrap_or_default();
+        let object = self.model.object(place);
+        (object.map_or(0, |object| object.id), object.map(|object| object.name.clone()).unwrap_or_default(), part)
+    }
+
+    /// The text of a part, where the tag that ends the vertices of an object's mesh begins in it, and what stands between the tags of its triangles.
+    pub(crate) fn mesh_at(&self, place: Place) -> (&[u8], usize, Range<usize>) {
+        match self.model.object(place).map(|object| &object.content) {
+            Some(Content::Mesh(mesh)) => (self.text(place.part), mesh.vertices.inner.end, mesh.triangles.inner.clone()),
+            _ => (&[], 0, 0..0),
+        }
+    }
+
+    /// The text of a part.
+    pub(crate) fn text(&self, part: usize) -> &[u8] {
+        self.model.parts.get(part).map_or(&[], |part| part.text())
+    }
+
+    /// The number of a part's entry in the archive.
+    pub(crate) fn entry_of(&self, part: usize) -> Option<usize> {
+        let name = &self.model.parts.get(part)?.name;
+        self.model.entries.iter().position(|entry| entry.name == *name)
+    }
+
+    /// All volumes of the slicer's, in the order of its text.
+    pub(crate) fn volumes(&self) -> &[Volume] {
+        &self.volumes
+    }
+
+    /// The numbers of an object's volumes. They are of objects of the first part.
+    pub(crate) fn volumes_at(&self, place: Place) -> Vec<usize> {
+        let id = self.model.object(place).map(|object| object.id).filter(|_| place.part == 0);
+        (0..self.volumes.len()).filter(|k| self.volumes.get(*k).map(|volume| volume.object) == id).collect()
+    }
+
+    /// An object's volumes.
+    pub(crate) fn volumes_of(&self, place: Place) -> Vec<&Volume> {
+        self.volumes_at(place).into_iter().filter_map(|k| self.volumes.get(k)).collect()
+    }
+
+    /// The number of the entry that holds the volumes, and its text.
+    pub(crate) fn config(&self) -> Option<(usize, &[u8])> {
+        self.config.as_ref().map(|(entry, text)| (*entry, text.as_slice()))
+    }
+
+    /// The package has a digital signature.
+    pub(crate) fn is_signed(&self) -> bool {
+        self.model.signed
+    }
+
+    /// Oddities of the package, and what of it is no mesh to be repaired.
+    pub(crate) fn findings(&self) -> &[Finding] {
+        &self.findings
+    }
+
+    /// The whole file.
+    pub(crate) fn bytes(&self) -> &[u8] {
+        &self.input
+    }
+
+    pub(crate) fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// As [`super::MeshFile::check_unchanged`].
+    ///
+    /// # Errors
+    /// [`crate::Error::Changed`], [`crate::Error::Io`].
+    pub(crate) fn check_unchanged(&self) -> Result<()> {
+        self.opened.check_unchanged()
+    }
+}
+
+/// All objects with their places.
+fn places(model: &Model) -> impl Iterator<Item = (Place, &Object)> {
+    model.parts.iter().enumerate().flat_map(|(part, of)| {
+        of.objects.iter().enumerate().map(move |(object, own)| (Place { part, object }, own))
+    })
+}
+
+fn is_repaired(object: &Object) -> bool {
+    let is_printed = matches!(object.purpose, Purpose::Model | Purpose::SolidSupport);
+    is_printed && matches!(&object.content, Content::Mesh(mesh) if !mesh.lattice && !mesh.triangles.inner.is_empty())
+}
+
+/// What stays as it is.
+fn left_alone(model: &Model) -> Vec<Finding> {
+    let count = |is: fn(&Object) -> bool| places(model).filter(|(_, object)| is(object)).count() as u64;
+    let supports = count(|object| matches!(object.content, Content::Mesh(_)) && !matches!(object.purpose, Purpose::Model | Purpose::SolidSupport));
+    let foreign = count(|object| match &object.content {
+        Content::Mesh(mesh) => mesh.lattice,
+        Content::Foreign(_) => true,
+        Content::Components(_) | Content::Nothing => false,
+    });
+    let line = |count: u64, words: &str| {
+        let objects = Counted(count, "object stays as it is", "objects stay as they are");
+        (count > 0).then(|| Finding { harmless: true, ..Finding::flaw(format!("{objects}: {words}")) })
+    };
+    [line(supports, "support, surface or other, which needs to be no solid"), line(foreign, "no mesh of triangles alone")]
+        .into_iter()
+        .flatten()
+        .collect()
+}
+
+/// All that is built, as one mesh: each object where build items and components place it.
+pub(super) fn built(model: &Model, context: &Context<'_>) -> Result<Parsed> {
+    let mut spool = context.records()?;
+    let mut findings = model.findings.clone();
+    let mut rounding = Rounding::default();
+    let mut last: Option<(Place, MeshRecords)> = None;
+    let mut failed = Ok(());
+    for item in model.items() {
+        model.instances(item, |place, transform| {
+            let Some(object) = model.object(place) else { return };
+            if failed.is_err() || !is_repaired(object) {
+                return;
+            }
+            let mut add = || -> Result<()> {
+                if last.as_ref().is_none_or(|(there, _)| *there != place) {
+                    let read = model.records(place, context)?;
+                    findings.extend(read.parsed.findings.iter().cloned());
+                    last = Some((place, read));
+                }
+                let records = last.as_ref().map_or(&[][..], |(_, read)| read.parsed.records.all());
+                for chunk in records.chunks(PLACED) {
+                    let placed: Vec<Record> = chunk.iter().map(|record| placed(record, transform, &mut rounding)).collect();
+                    spool.append(&placed)?;
+                }
+                context.at(spool.count(), spool.count())
+            };
+            failed = add();
+        });
+    }
+    failed?;
+    if spool.count() == 0 {
+        return Err(binary::no_triangles().at(context.path));
+    }
+    Ok(Parsed { records: spool.map()?, findings, header: binary::header_of(b""), rounding: rounding.if_any() })
+}
+
+fn placed(record: &Record, transform: &super::threemf::Transform, rounding: &mut Rounding) -> Record {
+    if transform.is_identity() {
+        return *record;
+    }
+    let [a, b, c] = record::corners(record).map(|corner| transform.apply(corner.map(f64::from)).map(|x| rounding.of_double(x)));
+    // A mirror image is turned inside out.
+    record::encode(if transform.mirrors() { [a, c, b] } else { [a, b, c] }, record::attribute(record))
+}

@@ -1,0 +1,142 @@
+//! Volumes of PrusaSlicer's projects: stretches of an object's triangles that are bodies of their own.
+//!
+//! They stand in `Metadata/Slic3r_PE_model.config`: a `<volume firstid= lastid=>` for each, within the `<object id=>` (PrusaSlicer's
+//! `src/libslic3r/Format/3mf.cpp`, `_add_model_config_file_to_archive`). A volume is a part of the model or something that only tells the slicer
+//! where settings hold (`volume_type`, in old files `modifier`).
+
+use std::ops::Range;
+
+use quick_xml::Reader;
+use quick_xml::events::{BytesStart, Event};
+
+use super::super::finding::Rejection;
+
+/// The name of the part.
+pub(crate) const CONFIG: &str = "Metadata/Slic3r_PE_model.config";
+/// Most volumes of a package.
+const MOST_VOLUMES: usize = 1 << 16;
+
+/// A stretch of an object's triangles.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Volume {
+    /// The object's number.
+    pub(crate) object: u32,
+    /// Its triangles, by number.
+    pub(crate) triangles: Range<u64>,
+    /// It is printed; otherwise it says where settings hold.
+    pub(crate) is_part: bool,
+    /// Where the numbers of the first and of the last triangle stand in the text.
+    pub(crate) places: [Range<usize>; 2],
+}
+
+/// The volumes of all objects, in the order of the text. O(n) in it.
+///
+/// # Errors
+/// What is wrong with the text, or a stretch that ends before it begins.
+pub(crate) fn volumes(text: &[u8]) -> Result<Vec<Volume>, Rejection> {
+    let refuse = |reason: String| Rejection::Unreadable(format!("{CONFIG}: {reason}"));
+    let text = std::str::from_utf8(text).map_err(|_| refuse("is no UTF-8".into()))?;
+    let mut reader = Reader::from_str(text);
+    let (mut all, mut object): (Vec<Volume>, Option<u32>) = (Vec::new(), None);
+    let mut is_within = false;
+    loop {
+        let event = reader.read_event().map_err(|error| refuse(error.to_string()))?;
+        match event {
+            Event::Eof => return Ok(all),
+            Event::DocType(_) => return Err(refuse("has a document type".into())),
+            Event::Start(tag) | Event::Empty(tag) => match tag.local_name().as_ref() {
+                b"object" => object = value(&tag, b"id").and_then(|id| id.parse().ok()),
+                b"volume" => {
+                    let Some(object) = object else { continue };
+                    all.push(volume(text, &tag, object).ok_or_else(|| refuse(format!("object {object} has a volume of no triangles")))?);
+                    is_within = true;
+                    if all.len() > MOST_VOLUMES {
+                        return Err(refuse(format!("has more than {MOST_VOLUMES} volumes")));
+                    }
+                }
+                b"metadata" if is_within => {
+                    if let Some(last) = all.last_mut() {
+                        last.is_part &= !is_modifier(&tag);
+                    }
+                }
+                _ => {}
+            },
+            Event::End(tag) if tag.local_name().as_ref() == b"volume" => is_within = false,
+            _ => {}
+        }
+    }
+}
+
+fn value(tag: &BytesStart<'_>, name: &[u8]) -> Option<String> {
+    let attribute = tag.try_get_attribute(name).ok()??;
+    String::from_utf8(attribute.value.into_owned()).ok()
+}
+
+fn is_modifier(tag: &BytesStart<'_>) -> bool {
+    match (value(tag, b"key").as_deref(), value(tag, b"value").as_deref()) {
+        (Some("volume_type"), Some(kind)) => kind != "ModelPart",
+        (Some("modifier"), Some(is)) => is == "1",
+        _ => false,
+    }
+}
+
+fn volume(text: &str, tag: &BytesStart<'_>, object: u32) -> Option<Volume> {
+    let place = |name: &str| {
+        let attribute = tag.try_get_attribute(name).ok()??;
+        let bytes: &[u8] = &attribute.value;
+        // The tag lies in the text.
+        let from = (bytes.as_ptr() as usize).checked_sub(text.as_ptr() as usize)?;
+        let number: u64 = text.get(from..from + bytes.len())?.parse().ok()?;
+        Some((number, from..from + bytes.len()))
+    };
+    let ((first, from), (last, to)) = (place("firstid")?, place("lastid")?);
+    (first <= last && last < u64::from(u32::MAX)).then(|| Volume { object, triangles: first..last + 1, is_part: true, places: [from, to] })
+}
+
+/// The text with other stretches; `ranges` are those of all volumes. One without triangles has no place in such a text: the caller keeps it from that.
+pub(crate) fn renumbered(text: &[u8], volumes: &[Volume], ranges: &[Range<u64>]) -> Vec<u8> {
+    let mut changes: Vec<(&Range<usize>, u64)> = volumes
+        .iter()
+        .zip(ranges)
+        .flat_map(|(volume, range)| {
+            let [first, last] = &volume.places;
+            [(first, range.start), (last, range.end.saturating_sub(1))]
+        })
+        .collect();
+    changes.sort_by_key(|(place, _)| place.start);
+    let (mut all, mut at) = (Vec::with_capacity(text.len()), 0);
+    for (place, number) in changes {
+        all.extend_from_slice(text.get(at..place.start).unwrap_or_default());
+        all.extend_from_slice(number.to_string().as_bytes());
+        at = place.end;
+    }
+    all.extend_from_slice(text.get(at..).unwrap_or_default());
+    all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TEXT: &str = "<?xml version=\"1.0\"?>\n<config>\n <object id=\"4\" instances_count=\"1\">\n  <metadata type=\"object\" key=\"name\" value=\"a\"/>\n\
+        <volume lastid=\"11\" firstid=\"0\">\n <metadata type=\"volume\" key=\"volume_type\" value=\"ModelPart\"/></volume>\n\
+        <volume firstid=\"12\" lastid=\"99\"><metadata type=\"volume\" key=\"volume_type\" value=\"ParameterModifier\"/></volume>\n </object>\n</config>";
+
+    #[test]
+    fn stretches_of_triangles_are_read_and_written() {
+        let all = volumes(TEXT.as_bytes()).unwrap();
+        let said: Vec<_> = all.iter().map(|volume| (volume.object, volume.triangles.clone(), volume.is_part)).collect();
+        assert_eq!(said, [(4, 0..12, true), (4, 12..100, false)]);
+        let text = renumbered(TEXT.as_bytes(), &all, &[0..9, 9..97]);
+        let expected = TEXT.replace("lastid=\"11\"", "lastid=\"8\"").replace("firstid=\"12\" lastid=\"99\"", "firstid=\"9\" lastid=\"96\"");
+        assert_eq!(String::from_utf8(text).unwrap(), expected);
+    }
+
+    #[test]
+    fn what_is_wrong_is_refused() {
+        for text in ["<config><object id='1'><volume firstid='5' lastid='4'/></object></config>", "<!DOCTYPE a><config/>", "<config><a></b>"] {
+            assert!(volumes(text.as_bytes()).is_err(), "{text}");
+        }
+        assert_eq!(volumes(b"<config><object id='1'/></config>").unwrap(), []);
+    }
+}

@@ -40,7 +40,7 @@ impl Finding {
 
 /// Why a file was not read, before it is joined with the file's name.
 #[derive(Debug, PartialEq, Eq)]
-pub(super) enum Rejection {
+pub(crate) enum Rejection {
     /// No mesh, or damaged beyond reading.
     Unreadable(String),
     /// More triangles than a binary STL can count.
@@ -48,7 +48,7 @@ pub(super) enum Rejection {
 }
 
 impl Rejection {
-    pub(super) fn at(self, path: &Path) -> Error {
+    pub(crate) fn at(self, path: &Path) -> Error {
         match self {
             Self::Unreadable(reason) => Error::Unreadable { path: path.to_owned(), reason },
             Self::TooMany => Error::Refused {

@@ -25,14 +25,14 @@ pub(super) const POSITION_BYTES: usize = 12;
 
 /// A file that was parsed.
 #[derive(Debug)]
-pub(super) struct Parsed {
+pub(crate) struct Parsed {
     /// The records, in a file without a name.
-    pub(super) records: Items<50>,
-    pub(super) findings: Vec<Finding>,
+    pub(crate) records: Items<50>,
+    pub(crate) findings: Vec<Finding>,
     /// The header of an output in binary STL.
-    pub(super) header: [u8; HEADER_BYTES],
+    pub(crate) header: [u8; HEADER_BYTES],
     /// How far coordinates were moved to be `f32`, where the file holds finer ones.
-    pub(super) rounding: Option<Rounding>,
+    pub(crate) rounding: Option<Rounding>,
 }
 
 /// Paths, limits and progress of a reading.
@@ -163,11 +163,11 @@ impl<const N: usize> Spool<'_, N> {
 
 /// Items of `N` bytes in a file without a name.
 #[derive(Debug, Default)]
-pub(super) struct Items<const N: usize>(Option<Mmap>);
+pub(crate) struct Items<const N: usize>(Option<Mmap>);
 
 impl<const N: usize> Items<N> {
     /// All of them, in the order in which they were appended.
-    pub(super) fn all(&self) -> &[[u8; N]] {
+    pub(crate) fn all(&self) -> &[[u8; N]] {
         self.0.as_ref().map_or(&[], |map| map.as_chunks().0)
     }
 }

@@ -212,6 +212,11 @@ impl Document {
     /// Begins a mesh of the last object.
     fn mesh(&mut self, intake: &Intake<'_>) -> std::result::Result<(), Stop> {
         let (position, index) = (intake.positions.count(), intake.indices.count());
+        let own = self.objects.last().map_or(0, |object| object.meshes.len());
+        if own > 0 && self.meshes.last().is_some_and(|mesh| mesh.indices.is_empty()) {
+            // Without triangles: nothing of it is placed, and a million of such meshes in each of a million instances would take for ever.
+            self.meshes.pop();
+        }
         let mesh = Mesh { positions: position..position, indices: index..index, ..Mesh::default() };
         push(&mut self.meshes, mesh, "1 000 000 meshes")?;
         if let Some(object) = self.objects.last_mut() {

@@ -125,7 +125,7 @@ struct Placing<'a, 'c> {
 impl Placing<'_, '_> {
     /// Places one mesh.
     fn mesh(&mut self, mesh: &Mesh, kept: Kept<'_>, placement: &Placement) -> Result<()> {
-        self.rounding.append(if *placement == Placement::NONE { mesh.rounding } else { rounding(kept.positions, placement) });
+        self.rounding.append(if *placement == Placement::NONE { mesh.rounding } else { rounding(kept, placement) });
         if kept.indices.len() <= PIECE {
             let (records, tally) = records(kept, kept.indices, placement);
             self.waiting.extend(records);
@@ -192,20 +192,30 @@ fn rounded(point: [f64; 3]) -> Point {
     point.map(|value| value as f32)
 }
 
-/// How far the positions of a placed mesh are rounded.
-fn rounding(positions: &[Position], placement: &Placement) -> Rounding {
-    let of = |positions: &[Position]| {
-        let mut rounding = Rounding::default();
-        for position in positions {
-            for value in placement.place(point(position)) {
-                rounding.of_double(value);
-            }
+/// How far the positions of a placed mesh are rounded: of its vertices, or of the corners of its triangles where those are fewer, so that vertices
+/// without a triangle take no time for each instance.
+fn rounding(kept: Kept<'_>, placement: &Placement) -> Rounding {
+    let Kept { positions, indices } = kept;
+    let of = |rounding: &mut Rounding, position: &Position| {
+        for value in placement.place(point(position)) {
+            rounding.of_double(value);
         }
+    };
+    if indices.len() < positions.len() / 3 {
+        let mut rounding = Rounding::default();
+        let corners = indices.iter().flat_map(|triangle| triangle.as_chunks().0);
+        let placed = corners.filter_map(|index| positions.get(u32::from_le_bytes(*index) as usize));
+        placed.for_each(|position| of(&mut rounding, position));
+        return rounding;
+    }
+    let of_piece = |positions: &[Position]| {
+        let mut rounding = Rounding::default();
+        positions.iter().for_each(|position| of(&mut rounding, position));
         rounding
     };
     let join = |mut a: Rounding, b| {
         a.append(b);
         a
     };
-    positions.par_chunks(PIECE).map(of).reduce(Rounding::default, join)
+    positions.par_chunks(PIECE).map(of_piece).reduce(Rounding::default, join)
 }

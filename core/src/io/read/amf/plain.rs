@@ -7,6 +7,9 @@ use super::xml::is_blank;
 /// Bytes of a number that are looked at.
 const LONGEST_NUMBER: usize = 40;
 
+/// A number and its text.
+pub(super) type Written<'a> = (&'a [u8], Number);
+
 /// A place in a text, beyond blanks.
 struct Cursor<'a> {
     text: &'a [u8],
@@ -39,7 +42,7 @@ impl<'a> Cursor<'a> {
     }
 
     #[inline(always)]
-    fn coordinate(&mut self, begin: &[u8], end: &[u8]) -> Option<(&'a [u8], Number)> {
+    fn coordinate(&mut self, begin: &[u8], end: &[u8]) -> Option<Written<'a>> {
         self.tag(begin)?;
         let digits = self.digits()?;
         let number = number::number(digits).filter(|number| number.length == digits.len() && number.separator != COMMA)?;
@@ -83,7 +86,7 @@ fn long_index(digits: &[u8]) -> Option<u32> {
 
 /// A vertex at this byte: its coordinates as they are written and as numbers, and the byte behind it.
 #[inline]
-pub(super) fn vertex(text: &[u8], at: usize) -> Option<([(&[u8], Number); 3], usize)> {
+pub(super) fn vertex(text: &[u8], at: usize) -> Option<([Written<'_>; 3], usize)> {
     let mut cursor = Cursor { text, at };
     cursor.exactly(b"<vertex>")?;
     cursor.tag(b"<coordinates>")?;

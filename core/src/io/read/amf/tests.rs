@@ -291,11 +291,27 @@ fn constellations_without_end_are_refused() {
     let double =
         |k: i32| constellation(&k.to_string(), &[instance(&(k + 1).to_string(), &[]), instance(&(k + 1).to_string(), &[])]);
     refused(&(0..21).map(double).collect::<String>(), "1 000 000 instances");
-    // 2^30 triangles need more room than there is, or too many triangles: refused before anything is placed.
+    // The deepest that is placed.
     let short: String = (0..31).map(|k| one(&k.to_string(), &(k + 1).to_string())).collect();
     assert_eq!(placed(&(short + &one("31", "o"))), FLAT);
     let lost = open(amf(&(object("o", &FLAT, &[[0, 1, 2]]) + &one("a", "nobody"))).as_bytes()).unwrap();
     assert!(texts(&lost)[0].starts_with("1 instance of objects that are not there"), "{:?}", texts(&lost));
+}
+
+#[test]
+fn vertices_without_triangles_and_empty_meshes_take_no_time_for_each_instance() {
+    let flat = object("o", &FLAT, &[[0, 1, 2]]);
+    let loose = vertex([0.1; 3]).repeat(20_000);
+    let content = flat.replacen("</vertices>", &format!("{loose}</vertices>"), 1).replacen(
+        "<mesh>",
+        &("<mesh/>".repeat(20_000) + "<mesh>"),
+        1,
+    );
+    let many = constellation("a", &vec![instance("o", &[("deltax", 1.0)]); 20_000]);
+    let file = open(amf(&(content + &many)).as_bytes()).unwrap();
+    assert_eq!(file.records().len(), 20_000);
+    assert!(file.records().iter().all(|record| corners(record) == FLAT.map(|[x, y, z]| [x + 1.0, y, z])));
+    assert_eq!(texts(&file), ["1 constellation of 20 000 instances: 20 000 objects placed"]);
 }
 
 /// Some windows of text, in which comments as long as a hundred vertices hold vertices that are none: guesses of where a child begins go astray.

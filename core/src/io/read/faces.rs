@@ -84,8 +84,9 @@ impl<'v> Faces<'v> {
     #[inline]
     pub(super) fn triangle(&mut self, indices: [u64; 3]) {
         self.tally.faces += 1;
-        match indices.map(|index| self.vertices.get(index)) {
-            [Some(a), Some(b), Some(c)] => self.records.push(record::encode([a, b, c], 0)),
+        let [a, b, c] = indices;
+        match (self.vertices.get(a), self.vertices.get(b), self.vertices.get(c)) {
+            (Some(a), Some(b), Some(c)) => self.records.push(record::encode([a, b, c], 0)),
             _ => self.astray(),
         }
     }

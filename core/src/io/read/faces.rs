@@ -83,7 +83,8 @@ impl<'v> Faces<'v> {
     /// Appends a face that is a triangle, by the indices of its vertices.
     #[inline]
     pub(super) fn triangle(&mut self, indices: [u64; 3]) {
-        self.triangle_at(indices.map(|index| self.vertices.get(index)));
+        let [a, b, c] = indices;
+        self.triangle_at([self.vertices.get(a), self.vertices.get(b), self.vertices.get(c)]);
     }
 
     /// Appends a face that is a triangle, by its corners; one without a position refers to a vertex that is not there.

@@ -31,9 +31,8 @@ impl<'a> Vertices<'a> {
     pub(crate) fn get(&self, index: u64) -> Option<Point> {
         let index = usize::try_from(index).ok().filter(|index| *index < self.count)?;
         let from = index * self.stride;
-        let (words, _) = self.bytes.get(from..from + 12)?.as_chunks::<4>();
-        let [x, y, z] = words else { return None };
-        Some([*x, *y, *z].map(f32::from_le_bytes))
+        let [a, b, c, d, e, f, g, h, i, j, k, l] = *self.bytes.get(from..)?.first_chunk::<12>()?;
+        Some([f32::from_le_bytes([a, b, c, d]), f32::from_le_bytes([e, f, g, h]), f32::from_le_bytes([i, j, k, l])])
     }
 }
 

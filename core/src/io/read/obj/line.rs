@@ -87,12 +87,6 @@ impl<'a> Cursor<'a> {
         }
     }
 
-    /// The next word of this line, which it goes behind.
-    #[inline]
-    pub(super) fn word(&mut self) -> Option<&'a [u8]> {
-        self.is_at_word().then(|| self.rest_of_word())
-    }
-
     /// The next word of this line as a number, which it goes behind; `Some(None)` for a word that is none.
     #[inline]
     pub(super) fn number(&mut self) -> Option<Option<(Number, &'a [u8])>> {
@@ -182,7 +176,7 @@ mod tests {
         let numbers: Vec<_> =
             std::iter::from_fn(|| cursor.number()).map(|number| number.map(|(number, _)| number.value)).collect();
         assert_eq!(numbers, [Some(1.5), None]);
-        assert!(cursor.is_at_end() && cursor.word().is_none() && cursor.keyword().is_none());
+        assert!(cursor.is_at_end() && !cursor.is_at_word() && cursor.keyword().is_none());
     }
 
     #[test]

@@ -14,7 +14,9 @@ use robust::{Coord, orient2d};
 use super::cells::{Cells, NONE};
 
 /// Steps per corner and doubling of the corners, after which a polygon crosses itself too much to be cut well.
-const PATIENCE: usize = 64;
+const PATIENCE: usize = 16;
+/// Steps that the predicates of one corner count for.
+const PREDICATES: usize = 8;
 
 /// Cuts the polygon with these corners, more than three of them.
 pub(super) fn clip(flat: impl Iterator<Item = Coord<f64>>, mut take: impl FnMut([usize; 3])) {
@@ -177,11 +179,15 @@ impl Polygon {
             if self.is_outdated(corner, version) {
                 continue;
             }
-            if class == 0 || self.is_ear(corner) {
+            if class == 0 {
                 return Some(corner);
             }
+            self.patience = self.patience.saturating_sub(1);
             if self.patience == 0 {
                 return None;
+            }
+            if self.is_ear(corner) {
+                return Some(corner);
             }
         }
         if self.spare.is_none() {
@@ -259,8 +265,12 @@ impl Polygon {
     /// Whether a corner lies within a triangle or on its diagonal, or on an edge and goes on within.
     fn hinders(&mut self, corner: u32, &[u, v, w]: &[Coord<f64>; 3]) -> bool {
         let z = self.place(corner);
+        if z == u || z == v || z == w {
+            return false;
+        }
+        self.patience = self.patience.saturating_sub(PREDICATES);
         let sides = [orient2d(u, v, z), orient2d(v, w, z), orient2d(w, u, z)];
-        if z == u || z == v || z == w || sides.iter().any(|side| *side < 0.0) {
+        if sides.iter().any(|side| *side < 0.0) {
             return false;
         }
         let (from, to) = match sides {
@@ -337,6 +347,7 @@ impl Polygon {
 }
 
 /// The radius around a triangle: the smaller, the better an ear.
+#[allow(clippy::disallowed_methods, reason = "a radius is not negative, and its bits are in its order")]
 fn shape([a, b, c]: [Coord<f64>; 3]) -> u32 {
     let square = |a: Coord<f64>, b: Coord<f64>| (a.x - b.x).powi(2) + (a.y - b.y).powi(2);
     let radius =

@@ -38,6 +38,8 @@ pub(in super::super) struct Part {
     /// The text of the part, all of it.
     pub(in super::super) text: Items<1>,
     pub(in super::super) unit: Unit,
+    /// It is of the draft 0.93, whose namespace is another one.
+    pub(in super::super) draft: bool,
     /// Names and values of the model's metadata.
     pub(in super::super) metadata: Vec<(String, String)>,
     /// In the order of the part.
@@ -143,7 +145,10 @@ pub(in super::super) struct Model {
     pub(in super::super) parts: Vec<Part>,
     /// Parts by their names in lower case.
     pub(super) by_name: HashMap<String, usize>,
+    /// There are digital signatures, which no changed package keeps.
     pub(in super::super) signed: bool,
+    /// There is a keystore (3MF Secure Content).
+    pub(in super::super) secured: bool,
     pub(in super::super) findings: Vec<Finding>,
 }
 

@@ -1,11 +1,8 @@
 //! An archive as a package.
 
-use std::collections::BTreeSet;
-
 use super::super::archive::{Archive, Entry, shown};
 use super::super::finding::{Finding, Rejection};
 use super::super::spool::{Context, Items};
-use super::super::xml::Xml;
 use super::part_name::{relationships_of, resolve};
 use super::relationships::{self, Relationship};
 use crate::contract::error::Result;
@@ -15,9 +12,9 @@ const START: &str = "http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmode
 /// Where all writers put the start part.
 const USUAL_START: &str = "3D/3dmodel.model";
 const SIGNATURES: &str = "http://schemas.openxmlformats.org/package/2006/relationships/digital-signature/origin";
-const ENCRYPTED: &str = "http://schemas.openxmlformats.org/package/2006/relationships/encryptedfile";
+/// Every part that is encrypted begins with this (3MF Secure Content 1.0.2, 2.3), whatever the relationships and the keystore say.
+const ENCRYPTED: &[u8] = b"%3McF";
 const KEYSTORE: &str = "http://schemas.microsoft.com/3dmanufacturing/2019/04/keystore";
-const KEYSTORE_NAMESPACE: &str = "http://schemas.microsoft.com/3dmanufacturing/securecontent/2019/04";
 
 /// A package.
 pub(crate) struct Opc<'a> {
@@ -26,8 +23,8 @@ pub(crate) struct Opc<'a> {
     pub(crate) start: String,
     /// There are digital signatures, which no changed package keeps.
     pub(crate) signed: bool,
-    /// Parts that are encrypted, in lower case.
-    encrypted: BTreeSet<String>,
+    /// There is a keystore: some parts may be encrypted.
+    pub(crate) keystore: bool,
     pub(crate) findings: Vec<Finding>,
 }
 
@@ -44,13 +41,8 @@ impl<'a> Opc<'a> {
         }
         let root = relationships(&archive, "", context)?;
         let start = start(&archive, &root, &mut findings).map_err(reject)?;
-        let mut package = Self { archive, start, signed: false, encrypted: BTreeSet::new(), findings };
-        package.signed = root.iter().any(|relationship| relationship.kind == SIGNATURES);
-        package.note_encrypted("", &root);
-        for keystore in root.iter().filter(|relationship| relationship.kind == KEYSTORE && !relationship.external) {
-            package.read_keystore(&keystore.target, context)?;
-        }
-        Ok(package)
+        let has = |kind: &str| root.iter().any(|relationship| relationship.kind == kind);
+        Ok(Self { signed: has(SIGNATURES), keystore: has(KEYSTORE), archive, start, findings })
     }
 
     /// The entries of the archive, in its order.
@@ -59,10 +51,8 @@ impl<'a> Opc<'a> {
     }
 
     /// The relationships of a part, none if it has none.
-    pub(crate) fn relationships(&mut self, part: &str, context: &Context<'_>) -> Result<Vec<Relationship>> {
-        let found = relationships(&self.archive, part, context)?;
-        self.note_encrypted(part, &found);
-        Ok(found)
+    pub(crate) fn relationships(&self, part: &str, context: &Context<'_>) -> Result<Vec<Relationship>> {
+        relationships(&self.archive, part, context)
     }
 
     /// The content of a part, in a spool.
@@ -71,42 +61,17 @@ impl<'a> Opc<'a> {
     /// [`crate::Error::Unreadable`] if it is not there or encrypted; those of [`Archive::spooled`].
     pub(crate) fn spooled(&self, part: &str, context: &Context<'_>) -> Result<Items<1>> {
         let refuse = |reason: &str| Rejection::Unreadable(format!("the part {} {reason}", shown(part))).at(context.path);
-        if self.encrypted.contains(&part.to_ascii_lowercase()) {
+        let entry = self.archive.find(part).filter(|entry| !entry.is_folder());
+        let content = self.archive.spooled(entry.ok_or_else(|| refuse("is not in the package"))?, context)?;
+        if content.all().as_flattened().starts_with(ENCRYPTED) {
             return Err(refuse("is encrypted (3MF Secure Content)"));
         }
-        let entry = self.archive.find(part).filter(|entry| !entry.is_folder());
-        self.archive.spooled(entry.ok_or_else(|| refuse("is not in the package"))?, context)
+        Ok(content)
     }
 
     /// The name of a part as the archive has it, if it is there.
     pub(crate) fn name_of(&self, part: &str) -> Option<&str> {
         self.archive.find(part).filter(|entry| !entry.is_folder()).map(|entry| entry.name.as_str())
-    }
-
-    fn note_encrypted(&mut self, source: &str, found: &[Relationship]) {
-        let targets = found.iter().filter(|relationship| relationship.kind == ENCRYPTED && !relationship.external);
-        self.encrypted.extend(targets.filter_map(|to| resolve(source, &to.target)).map(|name| name.to_ascii_lowercase()));
-    }
-
-    /// Notes the parts that a keystore has keys for.
-    fn read_keystore(&mut self, target: &str, context: &Context<'_>) -> Result<()> {
-        let reject = |rejection: Rejection| rejection.at(context.path);
-        let Some(entry) = resolve("", target).and_then(|name| self.archive.find(&name)) else { return Ok(()) };
-        let text = self.archive.small(entry, context)?;
-        let mut xml = Xml::of(&entry.name, &text).map_err(reject)?;
-        let mut encrypted = Vec::new();
-        loop {
-            match xml.next().map_err(reject)? {
-                super::super::xml::Node::Start(element) if element.is(KEYSTORE_NAMESPACE, "resourcedata") => {
-                    let path = element.plain("path").map_err(|reason| reject(xml.refuse_element(&element, reason)))?;
-                    encrypted.extend(path.and_then(|path| resolve("", &path)).map(|name| name.to_ascii_lowercase()));
-                }
-                super::super::xml::Node::Over => break,
-                _ => {}
-            }
-        }
-        self.encrypted.extend(encrypted);
-        Ok(())
     }
 }
 

@@ -73,16 +73,14 @@ fn a_start_part_that_is_nowhere_is_refused() {
 
 #[test]
 fn signatures_are_told_and_encrypted_parts_are_not_read() {
-    let keystore = "<keystore xmlns='http://schemas.microsoft.com/3dmanufacturing/securecontent/2019/04'>\
-        <resourcedatagroup><resourcedata path='/3D/Secret.model'/></resourcedatagroup></keystore>";
-    let parts = [member("3D/x.model", "text"), member("3D/secret.model", "?"), member("Secure/keystore.xml", keystore)];
+    let parts = [member("3D/x.model", "text"), member("3D/secret.model", "%3McF\0\0\0?"), member("Secure/keystore.xml", "")];
     let root = [
         (MODEL, "/3D/x.model", ""),
         ("http://schemas.openxmlformats.org/package/2006/relationships/digital-signature/origin", "/s", ""),
         ("http://schemas.microsoft.com/3dmanufacturing/2019/04/keystore", "/Secure/keystore.xml", ""),
     ];
     let bytes = package(&root, &parts);
-    assert!(opened(&bytes, |package, _| Ok(package.signed)).unwrap());
+    assert!(opened(&bytes, |package, _| Ok(package.signed && package.keystore)).unwrap());
     assert!(opened(&bytes, |package, context| package.spooled("3D/x.model", context)).is_ok());
     assert!(reason(opened(&bytes, |package, context| package.spooled("3D/secret.model", context))).contains("encrypted"));
 }

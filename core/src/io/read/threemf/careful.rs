@@ -7,7 +7,7 @@ use std::path::Path;
 use super::super::finding::Rejection;
 use super::super::vertices::Vertices;
 use super::super::xml::{Element, Node, Scopes, Xml};
-use super::extensions::CORE;
+use super::extensions::is_core;
 use super::outline::Attributes;
 use super::shards::{Corners, Points, Shard};
 use crate::contract::error::Result;
@@ -40,7 +40,7 @@ fn elements(
     while count < AT_A_TIME {
         match xml.next()? {
             Node::Start(element) => {
-                if element.is(CORE, name) {
+                if is_core(&element, name) {
                     each(&Attributes { xml, element: &element })?;
                     count += 1;
                 }

@@ -1,6 +1,11 @@
 //! Namespaces of 3MF, and which of them are understood.
 
-pub(super) const CORE: &str = "http://schemas.microsoft.com/3dmanufacturing/core/2015/02";
+use super::super::archive::shown;
+use super::super::xml::Element;
+
+const CORE: &str = "http://schemas.microsoft.com/3dmanufacturing/core/2015/02";
+/// The namespace of the draft 0.93, whose meshes, components and builds are the same.
+const DRAFT: &str = "http://schemas.microsoft.com/3dmanufacturing/2013/01";
 pub(super) const PRODUCTION: &str = "http://schemas.microsoft.com/3dmanufacturing/production/2015/06";
 pub(super) const BEAM_LATTICE: &str = "http://schemas.microsoft.com/3dmanufacturing/beamlattice/2017/02";
 
@@ -29,6 +34,21 @@ const KNOWN: [(&str, &str); 5] = [
     ("/levelset", "level sets"),
 ];
 
+/// This element of 3MF Core.
+pub(super) fn is_core(element: &Element<'_>, name: &str) -> bool {
+    element.name == name && in_core(element)
+}
+
+/// An element of 3MF Core.
+pub(super) fn in_core(element: &Element<'_>) -> bool {
+    element.namespace.as_deref() == Some(CORE) || in_draft(element)
+}
+
+/// An element of the draft.
+pub(super) fn in_draft(element: &Element<'_>) -> bool {
+    element.namespace.as_deref() == Some(DRAFT)
+}
+
 /// This extension may be required.
 pub(super) fn is_understood(namespace: &str) -> bool {
     UNDERSTOOD.contains(&namespace)
@@ -37,7 +57,7 @@ pub(super) fn is_understood(namespace: &str) -> bool {
 /// An extension for people.
 pub(super) fn words(namespace: &str) -> String {
     let known = KNOWN.iter().find(|(part, _)| namespace.contains(part));
-    known.map_or_else(|| super::super::archive::shown(namespace), |(_, name)| format!("{name} ({namespace})"))
+    known.map_or_else(|| shown(namespace), |(_, name)| format!("{name} ({namespace})"))
 }
 
 /// What an object is made of, by the first element in it that is neither a mesh nor components.

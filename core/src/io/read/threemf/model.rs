@@ -38,6 +38,8 @@ pub(crate) struct Part {
     /// The text of the part, all of it.
     pub(crate) text: Items<1>,
     pub(crate) unit: Unit,
+    /// It is of the draft 0.93, whose namespace is another one.
+    pub(crate) draft: bool,
     /// Names and values of the model's metadata.
     pub(crate) metadata: Vec<(String, String)>,
     /// In the order of the part.
@@ -143,7 +145,10 @@ pub(crate) struct Model {
     pub(crate) parts: Vec<Part>,
     /// Parts by their names in lower case.
     pub(super) by_name: HashMap<String, usize>,
+    /// There are digital signatures, which no changed package keeps.
     pub(crate) signed: bool,
+    /// There is a keystore (3MF Secure Content).
+    pub(crate) secured: bool,
     pub(crate) findings: Vec<Finding>,
 }
 

@@ -3,7 +3,7 @@
 use super::super::finding::Rejection;
 use super::super::package::resolve;
 use super::super::xml::{Element, Xml};
-use super::extensions::{self, BEAM_LATTICE, CORE};
+use super::extensions::{self, BEAM_LATTICE, is_core};
 use super::model::{Component, Content, Mesh, Object, Purpose, Region};
 use super::outline::{Attributes, Budget};
 use super::transform::Transform;
@@ -26,13 +26,13 @@ pub(super) fn read(xml: &mut Xml<'_>, element: &Element<'_>, budget: &mut Budget
     let strings = [&object.name, &object.part_number, &object.uuid, &object.thumbnail];
     budget.spend(xml, strings.iter().map(|text| text.len()).sum())?;
     while let Some(child) = xml.child()? {
-        let content = if child.is(CORE, "mesh") {
+        let content = if is_core(&child, "mesh") {
             Content::Mesh(mesh(xml, &child)?)
-        } else if child.is(CORE, "components") {
+        } else if is_core(&child, "components") {
             Content::Components(components(xml, budget)?)
         } else {
             xml.skip()?;
-            match extensions::content(child.name).filter(|_| child.namespace.as_deref() != Some(CORE)) {
+            match extensions::content(child.name).filter(|_| !extensions::in_core(&child)) {
                 Some(foreign) => Content::Foreign(foreign),
                 None => continue,
             }
@@ -63,9 +63,9 @@ fn mesh(xml: &mut Xml<'_>, element: &Element<'_>) -> Result<Mesh, Rejection> {
     let whole = element.tag.clone();
     let mut mesh = Mesh { whole, vertices: Region::default(), triangles: Region::default(), lattice: false };
     while let Some(child) = xml.child()? {
-        let region = if child.is(CORE, "vertices") {
+        let region = if is_core(&child, "vertices") {
             &mut mesh.vertices
-        } else if child.is(CORE, "triangles") {
+        } else if is_core(&child, "triangles") {
             &mut mesh.triangles
         } else {
             mesh.lattice |= child.is(BEAM_LATTICE, "beamlattice");
@@ -96,7 +96,7 @@ fn region(xml: &mut Xml<'_>, element: &Element<'_>) -> Result<Region, Rejection>
 fn components(xml: &mut Xml<'_>, budget: &mut Budget) -> Result<Vec<Component>, Rejection> {
     let mut components = Vec::new();
     while let Some(child) = xml.child()? {
-        if child.is(CORE, "component") {
+        if is_core(&child, "component") {
             let component = reference(&Attributes { xml, element: &child })?;
             budget.spend(xml, component.path.as_ref().map_or(0, String::len))?;
             components.push(component);

@@ -19,14 +19,12 @@ impl Model {
     pub(crate) fn open(bytes: &[u8], context: &Context<'_>) -> Result<Self> {
         let reject = |rejection: Rejection| rejection.at(context.path);
         let archive = Archive::open(bytes).map_err(reject)?;
-        let mut package = Opc::open(archive, context)?;
+        let package = Opc::open(archive, context)?;
         let (mut parts, mut budget, mut by_name) = (Vec::new(), Budget::default(), HashMap::new());
         let start = package.start.clone();
         let mut known = HashSet::from([start.to_ascii_lowercase()]);
         let mut waiting = vec![start];
         while let Some(name) = waiting.pop() {
-            // Whether others are encrypted, the relationships tell.
-            package.relationships(&name, context)?;
             let text = package.spooled(&name, context)?;
             let part = outline::read(&name, text, &mut budget).map_err(reject)?;
             let mut next = Vec::new();
@@ -42,7 +40,11 @@ impl Model {
             parts.push(part);
         }
         let entries = package.entries().to_vec();
-        let mut model = Self { entries, parts, by_name, signed: package.signed, findings: package.findings };
+        let mut model =
+            Self { entries, parts, by_name, signed: package.signed, secured: package.keystore, findings: package.findings };
+        if model.parts.iter().any(|part| part.draft) {
+            model.findings.push(Finding::flaw("a model of the draft 0.93 of 3MF"));
+        }
         let mirrored = model.check_build().map_err(reject)?;
         if mirrored > 0 {
             let text = format!("{} of the build as mirror images", Counted(mirrored, "object", "objects"));

@@ -6,7 +6,7 @@ use std::collections::HashMap;
 use super::super::finding::Rejection;
 use super::super::spool::Items;
 use super::super::xml::{Element, Node, Xml};
-use super::extensions::{self, CORE, PRODUCTION};
+use super::extensions::{self, PRODUCTION, is_core};
 use super::model::{Item, Part, Unit};
 use super::object::{self, reference};
 use crate::util::words::Count;
@@ -79,25 +79,27 @@ pub(super) fn read(name: &str, text: Items<1>, budget: &mut Budget) -> Result<Pa
         name: name.to_owned(),
         text: Items::default(),
         unit: Unit::Millimeter,
+        draft: false,
         metadata: Vec::new(),
         objects: Vec::new(),
         by_id: HashMap::new(),
         items: Vec::new(),
     };
     let mut xml = Xml::of(name, text.all().as_flattened())?;
-    let root = xml.child()?.filter(|root| root.is(CORE, "model"));
+    let root = xml.child()?.filter(|root| is_core(root, "model"));
     let Some(root) = root else { return Err(xml.refuse("holds no 3MF model")) };
     let attributes = Attributes { xml: &xml, element: &root };
+    part.draft = extensions::in_draft(&root);
     part.unit = unit(&attributes)?;
     require(&attributes)?;
     let (mut kept, mut builds) = (0, 0);
     while let Some(child) = xml.child()? {
-        if child.is(CORE, "resources") {
+        if is_core(&child, "resources") {
             resources(&mut xml, &mut part, budget)?;
-        } else if child.is(CORE, "build") {
+        } else if is_core(&child, "build") {
             builds += 1;
             build(&mut xml, &mut part, budget)?;
-        } else if child.is(CORE, "metadata") {
+        } else if is_core(&child, "metadata") {
             metadata(&mut xml, &child, &mut part, &mut kept)?;
         } else {
             xml.skip()?;
@@ -148,7 +150,7 @@ fn require(attributes: &Attributes<'_, '_>) -> Result<(), Rejection> {
 
 fn resources(xml: &mut Xml<'_>, part: &mut Part, budget: &mut Budget) -> Result<(), Rejection> {
     while let Some(child) = xml.child()? {
-        if !child.is(CORE, "object") {
+        if !is_core(&child, "object") {
             xml.skip()?;
             continue;
         }
@@ -164,7 +166,7 @@ fn resources(xml: &mut Xml<'_>, part: &mut Part, budget: &mut Budget) -> Result<
 
 fn build(xml: &mut Xml<'_>, part: &mut Part, budget: &mut Budget) -> Result<(), Rejection> {
     while let Some(child) = xml.child()? {
-        if child.is(CORE, "item") {
+        if is_core(&child, "item") {
             let attributes = Attributes { xml, element: &child };
             let printable = attributes.plain("printable")?;
             let item = Item {

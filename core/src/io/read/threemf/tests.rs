@@ -6,7 +6,7 @@ use proptest::prelude::*;
 
 use super::super::spool::Context;
 use super::build::{DECLARED, TETRAHEDRON, model, package};
-use super::model::{Model, Place, Purpose, Unit};
+use super::model::{Content, Model, Place, Purpose, Unit};
 use super::transform::Transform;
 use super::*;
 use crate::contract::error::{Error, Result};
@@ -85,8 +85,6 @@ fn an_outline_has_all_that_a_model_says() {
     let expected = [(FIRST, moved("2 0 0 0 2 0 0 0 2 10 1 0")), (Place { part: 1, object: 0 }, moved("2 0 0 0 2 0 0 0 2 0 1 0"))];
     assert_eq!(outline.unwrap(), expected);
 }
-
-use super::model::Content;
 
 #[test]
 fn every_form_of_a_mesh_is_the_same_mesh() {
@@ -215,6 +213,13 @@ fn mirror_images_are_told() {
         model(&format!("<object id='1'>{TETRAHEDRON}</object>"), "<item objectid='1' transform='-1 0 0 0 1 0 0 0 1 0 0 0'/>");
     let findings = seen(&package(start, &[]), |model, _| Ok(model.findings.clone())).unwrap();
     assert!(findings[0].text.contains("1 object of the build as mirror images") && findings[0].harmless);
+}
+
+#[test]
+fn a_model_of_the_draft_is_read() {
+    let start = object(TETRAHEDRON).replace("core/2015/02", "2013/01");
+    assert_eq!(mesh(&start).unwrap(), mesh(&object(TETRAHEDRON)).unwrap());
+    assert!(seen(&package(start, &[]), |model, _| Ok(model.findings[0].text.contains("draft"))).unwrap());
 }
 
 #[test]

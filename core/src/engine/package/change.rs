@@ -102,7 +102,7 @@ impl<'a> Maker<'a> {
 
     fn mend(&self, unit: &UnitOf, read: &MeshRecords, sections: &mut Vec<Section>, clock: &mut Clock) -> Result<Mended> {
         let Work { profile, limits, progress } = self.work;
-        let mesh = units::spooled(self.package, unit, read, self.work)?;
+        let (mesh, _held) = units::spooled(self.package, unit, read, self.work)?;
         let spool = Nameless::new(limits)?;
         let target = Target { layout: None, is_input: true };
         let made = files::make(mesh, &spool.path, target, (profile, limits), progress, clock)?;

@@ -48,7 +48,7 @@ pub(crate) fn inspect(package: &PackageFile, work: Work<'_>, clock: &mut Clock) 
             if !unit.is_repaired {
                 continue;
             }
-            let mesh = units::spooled(package, &unit, &read, work)?;
+            let (mesh, _held) = units::spooled(package, &unit, &read, work)?;
             let report = files::look(&mesh, (work.profile, work.limits), work.progress, clock)?;
             sections.push(section(package, &unit, report, &read.parsed.findings));
         }

@@ -76,15 +76,15 @@ impl Nameless {
     }
 }
 
-/// The triangles of a unit as an STL of their own, opened. Errors and reports name it as the package.
+/// The triangles of a unit as an STL of their own, opened; it is there as long as the file is held. Errors and reports name it as the package.
 ///
 /// # Errors
 /// [`Error::NoSpace`], [`Error::Io`].
-pub(super) fn spooled(package: &PackageFile, unit: &UnitOf, read: &MeshRecords, work: Work<'_>) -> Result<MeshFile> {
+pub(super) fn spooled(package: &PackageFile, unit: &UnitOf, read: &MeshRecords, work: Work<'_>) -> Result<(MeshFile, Nameless)> {
     let records = read.parsed.records.all().get(unit.triangles.clone()).unwrap_or_default();
     let file = stl(package.path(), &read.parsed.header, records, work.limits)?;
     let spool = Nameless::of(file);
-    Ok(files::open(&spool.path, work.limits, work.progress)?.called(package.path()))
+    Ok((files::open(&spool.path, work.limits, work.progress)?.called(package.path()), spool))
 }
 
 fn stl(path: &Path, header: &[u8], records: &[Record], limits: &Limits) -> Result<File> {

@@ -14,9 +14,9 @@ use robust::{Coord, orient2d};
 use super::cells::{Cells, NONE};
 
 /// Steps per corner and doubling of the corners, after which a polygon crosses itself too much to be cut well.
-const PATIENCE: usize = 16;
+const PATIENCE: usize = 64;
 /// Steps that the predicates of one corner count for.
-const PREDICATES: usize = 8;
+const PREDICATES: usize = 4;
 
 /// Cuts the polygon with these corners, more than three of them.
 pub(super) fn clip(flat: impl Iterator<Item = Coord<f64>>, mut take: impl FnMut([usize; 3])) {

@@ -178,7 +178,7 @@ fn written(vertices: &[Point], faces: &[Vec<usize>], spelling: Spelling) -> Stri
     if early && !relative { format!("vt 0 0{end}{faces}{vertices}") } else { vertices + &faces }
 }
 
-fn opened(bytes: &[u8], threads: usize) -> crate::contract::error::Result<MeshFile> {
+fn opened(bytes: &[u8], threads: usize) -> Result<MeshFile> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("part.obj");
     std::fs::write(&path, bytes).unwrap();

@@ -4,8 +4,8 @@ use robust::Coord;
 
 /// No corner.
 pub(super) const NONE: u32 = u32::MAX;
-/// Most columns, and rows.
-const MOST: usize = 512;
+/// Most cells.
+const MOST: usize = 1 << 18;
 /// How far a crossing of an edge and a row may be off, as a share of the coordinates: many times what `f64` rounds by.
 const SLACK: f64 = 1e-12;
 
@@ -20,9 +20,15 @@ pub(super) struct Cells {
 impl Cells {
     /// For polygons with these corners, about `listed` of which will be in lists.
     pub(super) fn of(corners: &[Coord<f64>], listed: usize) -> Self {
-        let parts = listed.isqrt().clamp(1, MOST);
-        let columns = bounds(corners.iter().map(|corner| corner.x), parts);
-        let rows = bounds(corners.iter().map(|corner| corner.y), parts);
+        let cells = listed.clamp(1, MOST);
+        let xs = |parts: usize| bounds(corners.iter().map(|corner| corner.x), parts);
+        let ys = |parts: usize| bounds(corners.iter().map(|corner| corner.y), parts);
+        let mut columns = xs(cells.isqrt());
+        let rows = ys(cells / (columns.len() + 1));
+        // Teeth of a comb end at few heights: the more columns there may be.
+        if (rows.len() + 1) * (columns.len() + 1) * 2 < cells {
+            columns = xs(cells / (rows.len() + 1));
+        }
         let first = vec![NONE; (columns.len() + 1) * (rows.len() + 1)];
         let largest = corners.iter().fold(0.0, |largest: f64, corner| largest.max(corner.x.abs()));
         Self { columns, rows, first, slack: largest * SLACK }

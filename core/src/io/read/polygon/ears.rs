@@ -14,9 +14,13 @@ use robust::{Coord, orient2d};
 use super::cells::{Cells, NONE};
 
 /// Steps per corner and doubling of the corners, after which a polygon crosses itself too much to be cut well.
-const PATIENCE: usize = 16;
+const PATIENCE: usize = 64;
+/// Most steps, whatever the corners: a few seconds.
+const MOST_PATIENCE: usize = 1 << 26;
+/// Steps that taking a corner from a queue counts for.
+const QUEUE: usize = 16;
 /// Steps that the predicates of one corner count for.
-const PREDICATES: usize = 8;
+const PREDICATES: usize = 4;
 
 /// Cuts the polygon with these corners, more than three of them.
 pub(super) fn clip(flat: impl Iterator<Item = Coord<f64>>, mut take: impl FnMut([usize; 3])) {
@@ -106,6 +110,7 @@ impl Polygon {
         let others = (0..count).zip(&corners).filter(|(place, corner)| !turns_left(*place, corner)).count();
         let cells = Cells::of(&places, others);
         let patience = PATIENCE * places.len() * (places.len().ilog2() as usize + 1);
+        let patience = patience.min(MOST_PATIENCE);
         let (ready, spare) = (BinaryHeap::new(), None);
         let mut polygon = Self { places, corners, cells, ready, spare, patience, any: 0 };
         (0..count).for_each(|corner| polygon.consider(corner));
@@ -182,7 +187,7 @@ impl Polygon {
             if class == 0 {
                 return Some(corner);
             }
-            self.patience = self.patience.saturating_sub(1);
+            self.patience = self.patience.saturating_sub(QUEUE);
             if self.patience == 0 {
                 return None;
             }

@@ -22,7 +22,7 @@ use crate::io::record::Point;
 /// Calls `take` with the corners of each triangle, as places in `polygon`, in the polygon's direction; n - 2 of them for n corners.
 ///
 /// A convex polygon becomes a fan from its first corner, as most readers have it. O(n log n) for the polygons of real files; at most about
-/// 16 n log n steps for any, and 128 bytes per corner.
+/// 64 n log n steps, or 2^26, for any, and 128 bytes per corner.
 pub(super) fn cut(polygon: &[Point], mut take: impl FnMut([usize; 3])) {
     match Plane::of(polygon) {
         Some(plane) if polygon.len() > 3 => match *polygon {

@@ -7,8 +7,8 @@ use std::path::Path;
 use super::super::finding::Rejection;
 use super::super::vertices::Vertices;
 use super::super::xml::{Element, Node, Scopes, Xml};
+use super::attributes::Attributes;
 use super::extensions::is_core;
-use super::outline::Attributes;
 use super::shards::{Corners, Points, Shard};
 use crate::contract::error::Result;
 

@@ -10,6 +10,8 @@
 //! By 3MF Core 1.3 (2 package, 3.3 units, 3.4 extensions and metadata, 4 objects, 4.1 meshes, 4.2 components, 3.4.3 build), Materials 1.2.1, Production 1.1.2 (2 paths),
 //! Slice 1.0.2, Beam Lattice 1.2 (2), Triangle Sets, Secure Content 1.0.2.
 
+mod attributes;
+mod budget;
 #[cfg(test)]
 mod build;
 mod careful;

@@ -3,9 +3,10 @@
 use super::super::finding::Rejection;
 use super::super::package::resolve;
 use super::super::xml::{Element, Xml};
+use super::attributes::Attributes;
+use super::budget::Budget;
 use super::extensions::{self, BEAM_LATTICE, is_core};
 use super::model::{Component, Content, Mesh, Object, Purpose, Region};
-use super::outline::{Attributes, Budget};
 use super::transform::Transform;
 
 /// Reads the object that `element` begins.

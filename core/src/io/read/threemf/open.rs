@@ -6,8 +6,9 @@ use super::super::archive::{Archive, shown};
 use super::super::finding::{Finding, Rejection};
 use super::super::package::Opc;
 use super::super::spool::Context;
+use super::budget::Budget;
 use super::model::{Content, Model, Part};
-use super::outline::{self, Budget};
+use super::outline;
 use crate::contract::error::Result;
 use crate::util::words::Counted;
 

@@ -1,74 +1,19 @@
 //! The outline of one part: all of it but vertices and triangles.
 
-use std::borrow::Cow;
 use std::collections::HashMap;
 
 use super::super::finding::Rejection;
 use super::super::spool::Items;
 use super::super::xml::{Element, Node, Xml};
-use super::extensions::{self, PRODUCTION, is_core};
+use super::attributes::Attributes;
+use super::budget::Budget;
+use super::extensions::{self, is_core};
 use super::model::{Item, Part, Unit};
 use super::object::{self, reference};
 use crate::util::words::Count;
 
-/// Bytes that outlines of a package take, at most: a small archive unpacks to very many empty objects.
-const MOST_BYTES: usize = 256 << 20;
 /// Bytes of metadata that are kept of a part.
 const METADATA: usize = 1 << 20;
-
-/// Counts what outlines take.
-#[derive(Debug, Default)]
-pub(super) struct Budget {
-    spent: usize,
-}
-
-impl Budget {
-    /// Counts a thing with these strings.
-    pub(super) fn spend(&mut self, xml: &Xml<'_>, strings: usize) -> Result<(), Rejection> {
-        self.spent = self.spent.saturating_add(strings).saturating_add(512);
-        if self.spent > MOST_BYTES {
-            return Err(xml.refuse(format!("has too many objects: they take more than {} MiB", MOST_BYTES >> 20)));
-        }
-        Ok(())
-    }
-}
-
-/// Reads attributes of an element, and refuses them in its name.
-pub(super) struct Attributes<'x, 'a> {
-    pub(super) xml: &'x Xml<'a>,
-    pub(super) element: &'x Element<'a>,
-}
-
-impl<'a> Attributes<'_, 'a> {
-    pub(super) fn refuse(&self, reason: impl std::fmt::Display) -> Rejection {
-        self.xml.refuse_element(self.element, reason)
-    }
-
-    pub(super) fn plain(&self, name: &str) -> Result<Option<Cow<'a, str>>, Rejection> {
-        self.element.plain(name).map_err(|reason| self.refuse(reason))
-    }
-
-    pub(super) fn of(&self, namespace: &str, name: &str) -> Result<Option<Cow<'a, str>>, Rejection> {
-        self.element.of(namespace, name).map_err(|reason| self.refuse(reason))
-    }
-
-    /// The value of an attribute, empty if it is not there.
-    pub(super) fn text(&self, name: &str) -> Result<String, Rejection> {
-        Ok(self.plain(name)?.unwrap_or_default().into_owned())
-    }
-
-    /// A value of the production extension, empty if it is not there.
-    pub(super) fn production(&self, name: &str) -> Result<String, Rejection> {
-        Ok(self.of(PRODUCTION, name)?.unwrap_or_default().into_owned())
-    }
-
-    /// A number of a resource or of something in it.
-    pub(super) fn id(&self, name: &str) -> Result<Option<u32>, Rejection> {
-        let Some(text) = self.plain(name)? else { return Ok(None) };
-        let id = text.trim().parse().map_err(|_| self.refuse(format!("has no number in its attribute {name}")))?;
-        Ok(Some(id))
-    }
-}
 
 /// Reads a part.
 ///
@@ -192,7 +137,9 @@ fn metadata(xml: &mut Xml<'_>, element: &Element<'_>, part: &mut Part, kept: &mu
         match xml.next()? {
             Node::Text(text) if value.len() + text.len() <= METADATA => value.push_str(&text),
             Node::Text(_) => {}
-            Node::Start(_) => drop(xml.skip()?),
+            Node::Start(_) => {
+                xml.skip()?;
+            }
             Node::End(_) | Node::Over => break,
         }
     }

@@ -1,6 +1,8 @@
 //! The plain form of vertices and triangles, as nearly all files have it: `<vertex x="…" y="…" z="…"/>`.
 //!
-//! Whatever is not of this form is `None`, and read by [`super::careful`]. What is, gives the same there; tests hold the two against each other.
+//! Whatever is not of this form is `None`, and read by [`super::careful`]: also numbers that are none, such as those with references in them. What is of
+//! this form gives the same there; tests hold the two against each other. Values that nobody asks for are not looked at, so that an error of XML in
+//! them is not noticed.
 
 use super::shards::{Corners, Points, Shard};
 
@@ -17,7 +19,7 @@ pub(super) fn vertices(text: &[u8], prefix: &[u8]) -> Option<Points> {
             b"z" => put(&mut values, 2, value),
             _ => true,
         })?;
-        points.push(values);
+        points.push(values).then_some(())?;
     }
     Some(points)
 }
@@ -41,16 +43,16 @@ pub(super) fn triangles<'v>(text: &[u8], prefix: &[u8], mut shard: Shard<'v>) ->
                 true
             }
         })?;
-        shard.push(corners);
+        shard.push(corners).then_some(())?;
     }
     Some(shard)
 }
 
-/// Notes a value. `false` if there is one already, or if it has a reference in it.
+/// Notes a value. `false` if there is one already.
 #[inline]
 fn put<'t>(values: &mut [Option<&'t [u8]>; 3], at: usize, value: &'t [u8]) -> bool {
     match values.get_mut(at) {
-        Some(slot @ None) if !value.contains(&b'&') => {
+        Some(slot @ None) => {
             *slot = Some(value);
             true
         }

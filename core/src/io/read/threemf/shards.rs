@@ -48,12 +48,12 @@ pub(super) struct PointCounts {
 }
 
 impl Points {
-    /// Appends a vertex. One that is damaged keeps its number, and has NaN where the number should be.
+    /// Appends a vertex. One that is damaged keeps its number, and has NaN where the number should be; then this is `false`.
     #[inline]
-    pub(super) fn push(&mut self, coordinates: [Option<&[u8]>; 3]) {
+    pub(super) fn push(&mut self, coordinates: [Option<&[u8]>; 3]) -> bool {
         let counts = &mut self.counts;
         let mut sound = true;
-        let point = coordinates.map(|value| {
+        let mut read = |value: Option<&[u8]>| {
             let text = trimmed(value.unwrap_or_default());
             match number::number(text).filter(|number| number.length == text.len()) {
                 Some(number) => {
@@ -66,9 +66,13 @@ impl Points {
                     f32::NAN
                 }
             }
-        });
+        };
+        // Without `map`, which is not unrolled.
+        let [x, y, z] = coordinates;
+        let point = [read(x), read(y), read(z)];
         counts.damaged += u64::from(!sound);
         self.positions.push(packed(point));
+        sound
     }
 }
 
@@ -132,14 +136,17 @@ impl<'v> Shard<'v> {
         Self { faces: Faces::of(vertices), counts: TriangleCounts::default() }
     }
 
-    /// Appends a triangle. An index that is missing or no number leads to no vertex.
+    /// Appends a triangle. An index that is missing or no number leads to no vertex; then this is `false`.
     #[inline]
-    pub(super) fn push(&mut self, corners: Corners<'_>) {
-        let [a, b, c] = corners.indices.map(|value| value.and_then(whole).unwrap_or(u64::MAX));
+    pub(super) fn push(&mut self, corners: Corners<'_>) -> bool {
+        let read = |value: Option<&[u8]>| value.and_then(whole).unwrap_or(u64::MAX);
+        let [a, b, c] = corners.indices;
+        let [a, b, c] = [read(a), read(b), read(c)];
         self.counts.repeated += u64::from((a == b || b == c || c == a) && a.max(b).max(c) != u64::MAX);
         self.counts.with_property += u64::from(corners.property);
         self.counts.with_vendor += u64::from(corners.vendor);
         self.faces.triangle([a, b, c]);
+        a.max(b).max(c) != u64::MAX
     }
 
     /// All that is told of these.

@@ -278,6 +278,29 @@ proptest! {
         prop_assert_eq!(fast, told(mesh(&careful)), "{}", start);
     }
 
+    /// The same anywhere in a model of two parts, with all that an outline looks at.
+    #[test]
+    fn a_changed_outline_is_read_or_refused(changes in prop::collection::vec((any::<prop::sample::Index>(), "[ -~\n]"), 1..4)) {
+        let mut start = model(
+            &format!("<object id='1'>{TETRAHEDRON}</object><object id='2'><components><component objectid='1' \
+                transform='1 0 0 0 1 0 0 0 1 0 0 5'/><component objectid='1' p:path='/3D/o.model'/></components></object>"),
+            "<item objectid='2'/><item objectid='1' printable='0'/>",
+        );
+        for (place, with) in changes {
+            let place = place.index(start.len());
+            start.replace_range(place..=place, &with);
+        }
+        let other = object(TETRAHEDRON);
+        let instances = seen(&package(start, &[("3D/o.model", &other)]), |model, context| {
+            let mut count = 0;
+            for item in model.items() {
+                model.instances(item, |place, _| count += u32::from(model.records(place, context).is_ok()));
+            }
+            Ok(count)
+        });
+        prop_assert!(instances.unwrap_or_default() <= 3);
+    }
+
     #[test]
     fn any_text_is_read_or_refused(text in "[<>/a-z0-9:=\"' ]{0,200}") {
         let _ = mesh(&text);

@@ -22,5 +22,4 @@ mod tests;
 mod tree;
 mod turn;
 
-pub(crate) use piece::Piece;
 pub(crate) use tree::Paint;

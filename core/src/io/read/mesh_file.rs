@@ -5,7 +5,7 @@ use super::limits::HEADER_BYTES;
 use super::opened::Opened;
 use super::rounding::Rounding;
 use super::spool::{Context, Items, Parsed};
-use super::{access, amf, binary, obj, off, ply, sniff, tail, text, unpacked};
+use super::{amf, binary, obj, off, ply, sniff, tail, text, unpacked};
 use crate::contract::error::Result;
 use crate::contract::progress::Progress;
 use crate::contract::report::Format;

@@ -72,7 +72,7 @@ pub(crate) fn is_numbered_once(mesh: &MeshText<'_>, units: &[Unit<'_>]) -> bool 
 /// Those of `sink`.
 pub(crate) fn write(mesh: &MeshText<'_>, units: &[Unit<'_>], at: usize, sink: &mut dyn FnMut(&[u8]) -> Result<()>) -> Result<Written> {
     let plan = Plan::of(mesh, units);
-    let mut writer = Writer { mesh, plan: &plan, at, batch: Vec::new(), result: Ok(()), sink, account: Account::default(), count: 0 };
+    let mut writer = Writer { mesh, plan: &plan, at, seen: 0, batch: Vec::new(), result: Ok(()), sink, account: Account::default(), count: 0 };
     writer.vertices();
     let mut elements = mesh.elements();
     let mut triangles = Vec::new();
@@ -95,6 +95,8 @@ struct Writer<'w, 't> {
     plan: &'w Plan<'t>,
     /// Up to here, the text is written.
     at: usize,
+    /// Up to here, its triangles are dealt with: those that stay are copied when one that does not stay follows.
+    seen: usize,
     /// Waits to be given on.
     batch: Vec<u8>,
     /// The first error of `sink`; nothing is written after it.
@@ -150,6 +152,7 @@ impl Writer<'_, '_> {
     /// Leaves so many triangles as they are.
     fn keep(&mut self, triangles: usize, elements: &mut Elements<'_>) {
         for element in elements.by_ref().take(triangles) {
+            self.seen = element.whole.end;
             self.account.kept += u64::from(!element.attributes.is_empty());
             self.count += 1;
         }
@@ -183,7 +186,7 @@ impl Writer<'_, '_> {
                     // Whether parts of it are left is known at the end.
                     self.account.lost += u64::from(!element.attributes.is_empty());
                     self.copy_to(element.whole.start);
-                    self.at = element.whole.end;
+                    self.pass(&element);
                 }
                 Fate::Part(of, corners) => {
                     let Some(element) = unit.parted.get(&of) else { return };
@@ -211,6 +214,7 @@ impl Writer<'_, '_> {
         self.account.kept += u64::from(!element.attributes.is_empty());
         let canonical = self.plan.canonical(element.vertices);
         if canonical == element.vertices {
+            self.seen = element.whole.end;
             self.count += 1;
         } else {
             self.replace(&element, canonical, &inherit::all(&element));
@@ -231,12 +235,22 @@ impl Writer<'_, '_> {
     /// Writes a triangle in the place of that of the text.
     fn replace(&mut self, element: &Element<'_>, vertices: [u32; 3], attributes: &[Attribute]) {
         self.copy_to(element.whole.start);
-        self.add(element.name, vertices, attributes);
-        self.at = element.whole.end;
+        self.put_triangle(element.name, vertices, attributes);
+        self.pass(element);
     }
 
-    /// Writes a triangle.
-    fn add(&mut self, name: &[u8], [a, b, c]: [u32; 3], attributes: &[Attribute]) {
+    /// Leaves out a triangle of the text.
+    fn pass(&mut self, element: &Element<'_>) {
+        (self.at, self.seen) = (element.whole.end, element.whole.end);
+    }
+
+    /// Writes a triangle behind those that were dealt with.
+    fn add(&mut self, name: &[u8], vertices: [u32; 3], attributes: &[Attribute]) {
+        self.copy_to(self.seen);
+        self.put_triangle(name, vertices, attributes);
+    }
+
+    fn put_triangle(&mut self, name: &[u8], [a, b, c]: [u32; 3], attributes: &[Attribute]) {
         let mut tag = b"<".to_vec();
         tag.extend_from_slice(name);
         let _ = write!(tag, " v1=\"{a}\" v2=\"{b}\" v3=\"{c}\"");

@@ -5,7 +5,6 @@
 use std::ops::Range;
 
 use super::super::binary;
-use super::super::finding::Rejection;
 use super::super::spool::{Context, Items, POSITION_BYTES, Parsed, Spool};
 use super::super::vertices::Vertices;
 use super::careful::{self, Piece};

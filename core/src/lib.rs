@@ -41,7 +41,9 @@ pub use contract::error::{Error, ErrorClass};
 pub use contract::progress::{Progress, Quiet};
 pub use contract::ranges::ProfileError;
 pub use contract::report::{FaceOrigin, RepairName, Report};
-pub use contract::settings::{Bodies, Guarantee, Hollow, KeepAttributes, Limits, OutputFormat, PatchShape, Profile, Sheets, Spill};
+pub use contract::settings::{
+    Bodies, Guarantee, Hollow, KeepAttributes, Limits, OutputFormat, PatchShape, Profile, Sheets, Spill,
+};
 pub use contract::{error, report, settings};
 pub use detect::fidelity::{FIDELITY_RULES, FidelityRule};
 pub use detect::rules::{RULES, Rule};

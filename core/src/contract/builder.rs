@@ -2,7 +2,9 @@
 
 use crate::contract::loop_class::LoopClass;
 use crate::contract::ranges::ProfileError;
-use crate::contract::settings::{Bodies, Guarantee, Hollow, KeepAttributes, Limits, OutputFormat, PatchShape, Profile, Sheets, Spill};
+use crate::contract::settings::{
+    Bodies, Guarantee, Hollow, KeepAttributes, Limits, OutputFormat, PatchShape, Profile, Sheets, Spill,
+};
 
 /// Makes a [`Profile`].
 ///

@@ -140,20 +140,41 @@ fn defects(all: &mut Defects, other: &Defects) {
         ($($field:ident),*) => { $(all.$field += other.$field;)* };
     }
     sums!(
-        triangles, nonfinite, vertices, vertices_used, edges, degenerate_index, degenerate_area, duplicates_same,
-        duplicates_opposite, boundary_edges, boundary_loops, nonmanifold_edges, nonmanifold_vertices, inconsistent_edges,
-        unbalanced_edges, components, inverted_components, bodies, cavities, nested_positive, noncommon_vertices,
-        weldable_vertices, area, volume
+        triangles,
+        nonfinite,
+        vertices,
+        vertices_used,
+        edges,
+        degenerate_index,
+        degenerate_area,
+        duplicates_same,
+        duplicates_opposite,
+        boundary_edges,
+        boundary_loops,
+        nonmanifold_edges,
+        nonmanifold_vertices,
+        inconsistent_edges,
+        unbalanced_edges,
+        components,
+        inverted_components,
+        bodies,
+        cavities,
+        nested_positive,
+        noncommon_vertices,
+        weldable_vertices,
+        area,
+        volume
     );
     // Where one was not looked at, nobody knows of all.
-    all.self_intersections = all.self_intersections.take().zip(other.self_intersections.as_ref()).map(|(all, other)| SelfIntersections {
-        triangles: all.triangles + other.triangles,
-        crossing_pairs: all.crossing_pairs + other.crossing_pairs,
-        overlapping_pairs: all.overlapping_pairs + other.overlapping_pairs,
-        // Numbers are those of one mesh.
-        listed: Vec::new(),
-        given_up: all.given_up || other.given_up,
-    });
+    all.self_intersections =
+        all.self_intersections.take().zip(other.self_intersections.as_ref()).map(|(all, other)| SelfIntersections {
+            triangles: all.triangles + other.triangles,
+            crossing_pairs: all.crossing_pairs + other.crossing_pairs,
+            overlapping_pairs: all.overlapping_pairs + other.overlapping_pairs,
+            // Numbers are those of one mesh.
+            listed: Vec::new(),
+            given_up: all.given_up || other.given_up,
+        });
     all.bounds = around(all.bounds, other.bounds);
     all.euler = all.euler.zip(other.euler).map(|(a, b)| a + b);
     all.at_least.extend(other.at_least.iter().cloned());

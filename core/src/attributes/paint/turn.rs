@@ -28,6 +28,7 @@ impl Paint {
     /// The same paint, with `by` as the number of the corner that is now the first one. (Any number is taken modulo 3.)
     ///
     /// O(n).
+    #[cfg(test)]
     pub(crate) fn rotated(&self, by: usize) -> Paint {
         self.turned([by % 3, (by + 1) % 3, (by + 2) % 3])
     }

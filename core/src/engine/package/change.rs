@@ -168,7 +168,10 @@ impl<'a> Maker<'a> {
             new.behind.finish().map_err(spooling())?;
             // SAFETY: the file has no name, this is its only handle, and it is not written to any more.
             let map = unsafe { Mmap::map(&new.file) }.map_err(Error::io(&folder, "mapping"))?;
-            let entry = self.package.entry_of(part).ok_or_else(|| Error::io(self.package.path(), "writing")(std::io::ErrorKind::NotFound.into()))?;
+            let entry = self
+                .package
+                .entry_of(part)
+                .ok_or_else(|| Error::io(self.package.path(), "writing")(std::io::ErrorKind::NotFound.into()))?;
             content.insert(entry, map);
         }
         let is_renumbered = self.package.volumes().iter().map(|volume| &volume.triangles).ne(&self.volumes);

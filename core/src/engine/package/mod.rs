@@ -6,6 +6,8 @@
 
 mod change;
 mod read_back;
+#[cfg(test)]
+mod tests;
 mod units;
 
 use std::path::Path;

@@ -40,7 +40,6 @@ pub struct MeshFile {
     format: Format,
     findings: Vec<Finding>,
     header: [u8; HEADER_BYTES],
-    rounding: Option<Rounding>,
 }
 
 /// What the bytes of a file hold.
@@ -49,7 +48,6 @@ struct Content {
     format: Format,
     findings: Vec<Finding>,
     header: [u8; HEADER_BYTES],
-    rounding: Option<Rounding>,
 }
 
 impl Content {
@@ -58,7 +56,7 @@ impl Content {
             sniff::Kind::Binary(sniff::Layout { triangles, mut findings }) => {
                 findings.extend(tail::of_records(binary::records(input, triangles)));
                 let header = binary::safe_header(binary::header(input));
-                Ok(Self { source: Source::InPlace(triangles), format: Format::BinaryStl, findings, header, rounding: None })
+                Ok(Self { source: Source::InPlace(triangles), format: Format::BinaryStl, findings, header })
             }
             sniff::Kind::Text(sniff::Text { start, mut findings }) => {
                 // Advice; without it reading ahead is only less bold.
@@ -99,7 +97,7 @@ impl Content {
     fn parsed(parsed: Parsed, format: Format, findings: Vec<Finding>) -> Self {
         let Parsed { records, findings: mut found, header, rounding } = parsed;
         found.extend(rounding.map(Rounding::finding));
-        Self { source: Source::Spooled(records), format, findings: [findings, found].concat(), header, rounding }
+        Self { source: Source::Spooled(records), format, findings: [findings, found].concat(), header }
     }
 }
 
@@ -116,8 +114,8 @@ impl MeshFile {
         let (opened, input, file) = Opened::bytes(path, spool, limits, progress)?;
         let kind = sniff::sniff(&input).map_err(|rejection| rejection.at(path))?;
         let content = Content::of(kind, &input, &Context { path, spool, limits, progress })?;
-        let Content { source, format, findings, header, rounding } = content;
-        Ok(Self { opened, name: path.to_owned(), file, input, source, format, findings, header, rounding })
+        let Content { source, format, findings, header } = content;
+        Ok(Self { opened, name: path.to_owned(), file, input, source, format, findings, header })
     }
 
     /// The triangles in input order, those with NaN or infinite coordinates included.

@@ -19,11 +19,11 @@ mod foreign;
 mod limits;
 mod mesh_file;
 mod number;
+mod obj;
+mod off;
 mod opened;
 mod package;
 mod package_file;
-mod obj;
-mod off;
 mod ply;
 mod polygon;
 mod rounding;
@@ -41,12 +41,14 @@ mod xml;
 /// Endings of names of the formats that are read, in lower case, without a point.
 pub const ENDINGS: [&str; 6] = ["stl", "3mf", "ply", "off", "obj", "amf"];
 
+#[cfg(test)]
+pub(crate) use archive::build as archive_build;
+pub(crate) use archive::{Archive, Entry};
 pub use finding::{Finding, Loss};
 pub use limits::{HEADER_BYTES, MAX_TRIANGLES, PREFIX_BYTES};
 pub use mesh_file::MeshFile;
-pub(crate) use archive::{Archive, Entry};
 pub(crate) use package_file::PackageFile;
+pub use tail::ends_in_zeros;
 pub(crate) use threemf::slicer;
 pub(crate) use threemf::{MeshRecords, Place};
 pub(crate) use vertices::Vertices;
-pub use tail::ends_in_zeros;

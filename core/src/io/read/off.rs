@@ -267,7 +267,7 @@ impl<'a> File<'a> {
             found.push(Finding::loss(format!("cut off: the header announces {announced} faces, the file holds {there}")));
         }
         if vertices.bent + read.bent > 0 {
-            found.push(Finding::loss(format!("{} lines with too few numbers", Count(vertices.bent + read.bent))));
+            found.push(Finding::loss(format!("{} with too few numbers", Counted(vertices.bent + read.bent, "line", "lines"))));
         }
         let mut line = Line { text: self.bytes, at: read.end, within: false, comments: true };
         let bytes = (self.bytes.len() - read.end.min(self.bytes.len())) as u64;

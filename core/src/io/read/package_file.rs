@@ -163,9 +163,11 @@ impl PackageFile {
 
 /// All objects with their places.
 fn places(model: &Model) -> impl Iterator<Item = (Place, &Object)> {
-    model.parts.iter().enumerate().flat_map(|(part, of)| {
-        of.objects.iter().enumerate().map(move |(object, own)| (Place { part, object }, own))
-    })
+    model
+        .parts
+        .iter()
+        .enumerate()
+        .flat_map(|(part, of)| of.objects.iter().enumerate().map(move |(object, own)| (Place { part, object }, own)))
 }
 
 fn is_repaired(object: &Object) -> bool {
@@ -176,7 +178,9 @@ fn is_repaired(object: &Object) -> bool {
 /// What stays as it is.
 fn left_alone(model: &Model) -> Vec<Finding> {
     let count = |is: fn(&Object) -> bool| places(model).filter(|(_, object)| is(object)).count() as u64;
-    let supports = count(|object| matches!(object.content, Content::Mesh(_)) && !matches!(object.purpose, Purpose::Model | Purpose::SolidSupport));
+    let supports = count(|object| {
+        matches!(object.content, Content::Mesh(_)) && !matches!(object.purpose, Purpose::Model | Purpose::SolidSupport)
+    });
     let foreign = count(|object| match &object.content {
         Content::Mesh(mesh) => mesh.lattice,
         Content::Foreign(_) => true,

@@ -7,7 +7,7 @@ const DIGITS_OF_F32: usize = 9;
 
 /// What became of coordinates that are finer than an `f32` can be.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Rounding {
+pub(crate) struct Rounding {
     /// So many coordinates are held in more than an `f32` needs, and moved.
     pub(super) moved: u64,
     /// The farthest that one was moved, in units of the file.

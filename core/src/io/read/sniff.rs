@@ -1,8 +1,8 @@
 //! Tells binary from text: by size first, then by content, never by the word `solid` alone, which many binary headers begin
 //! with (56 of 410 files drawn from a model site, ArtOfIllusion and SolidWorks among their makers).
 
-pub(super) use super::binary::Layout;
 use super::archive::Archive;
+pub(super) use super::binary::Layout;
 use super::finding::{Finding, Rejection};
 use super::{amf, binary, facets, foreign, obj, off};
 

@@ -36,7 +36,7 @@ pub(crate) struct Parsed {
 }
 
 /// Paths, limits and progress of a reading.
-pub(super) struct Context<'a> {
+pub(crate) struct Context<'a> {
     pub(super) path: &'a Path,
     /// The folder for spools.
     pub(super) spool: &'a Path,

@@ -70,9 +70,15 @@ pub(crate) fn is_numbered_once(mesh: &MeshText<'_>, units: &[Unit<'_>]) -> bool 
 ///
 /// # Errors
 /// Those of `sink`.
-pub(crate) fn write(mesh: &MeshText<'_>, units: &[Unit<'_>], at: usize, sink: &mut dyn FnMut(&[u8]) -> Result<()>) -> Result<Written> {
+pub(crate) fn write(
+    mesh: &MeshText<'_>,
+    units: &[Unit<'_>],
+    at: usize,
+    sink: &mut dyn FnMut(&[u8]) -> Result<()>,
+) -> Result<Written> {
     let plan = Plan::of(mesh, units);
-    let mut writer = Writer { mesh, plan: &plan, at, seen: 0, batch: Vec::new(), result: Ok(()), sink, account: Account::default(), count: 0 };
+    let mut writer =
+        Writer { mesh, plan: &plan, at, seen: 0, batch: Vec::new(), result: Ok(()), sink, account: Account::default(), count: 0 };
     writer.vertices();
     let mut elements = mesh.elements();
     let mut triangles = Vec::new();
@@ -247,6 +253,7 @@ impl Writer<'_, '_> {
     /// Writes a triangle behind those that were dealt with.
     fn add(&mut self, name: &[u8], vertices: [u32; 3], attributes: &[Attribute]) {
         self.copy_to(self.seen);
+        self.put(b"\n");
         self.put_triangle(name, vertices, attributes);
     }
 

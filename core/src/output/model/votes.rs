@@ -157,7 +157,10 @@ fn of_one_kind(element: &Element<'_>) -> Vec<(Vec<u8>, Vec<Attribute>)> {
     }
     for (name, value) in element.attributes.iter().filter(|(name, _)| inherit::is_paint(name)) {
         let Some(paint) = inherit::paint(value) else { continue };
-        let most = paint.state_areas().into_iter().fold((0, 0.0), |most, (state, share)| if share > most.1 { (state, share) } else { most });
+        let most = paint
+            .state_areas()
+            .into_iter()
+            .fold((0, 0.0), |most, (state, share)| if share > most.1 { (state, share) } else { most });
         if most.0 != 0 {
             let text = Paint::uniform(most.0).to_text().into_bytes();
             all.push((name.to_vec(), vec![(name.to_vec(), text)]));

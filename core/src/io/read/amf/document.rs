@@ -4,10 +4,10 @@ use super::super::finding::Rejection;
 use super::super::number;
 use super::super::rounding::Rounding;
 use super::super::spool::Context;
-use super::xml::{Tag, Token, Tokens, Trouble};
 use super::intake::Intake;
 use super::placement::Placement;
 use super::stretch::{End, Kind};
+use super::xml::{Tag, Token, Tokens, Trouble};
 use crate::contract::error::{Error, Result};
 
 /// Most objects, constellations, instances and meshes, each.

@@ -23,15 +23,14 @@ mod placed;
 mod placement;
 mod plain;
 mod stretch;
-mod xml;
 #[cfg(test)]
 mod tests;
+mod xml;
 
 use super::binary;
 use super::finding::{Finding, Loss, Rejection};
 use super::number::COMMA;
 use super::spool::{Context, Parsed};
-use xml::{Token, Tokens};
 use crate::contract::error::Result;
 use crate::util::words::{Count, Counted};
 use constellation::Names;
@@ -39,6 +38,7 @@ use document::{Document, NAMES_KEPT};
 use intake::Intake;
 use placed::Placed;
 use stretch::Notes;
+use xml::{Token, Tokens};
 
 /// Is this a text whose root is `amf`, after a byte order mark, blanks, comments and declarations?
 pub(super) fn is_amf(bytes: &[u8]) -> bool {

@@ -6,8 +6,8 @@
 use super::super::finding::Rejection;
 use super::super::number::{self, COMMA, Number, POINT};
 use super::super::rounding::Rounding;
-use super::xml::{Token, Tokens, Trouble};
 use super::plain;
+use super::xml::{Token, Tokens, Trouble};
 use crate::util::words::{Count, Counted};
 
 /// A position as it is kept until it is placed: x, y, z as little-endian `f64`.

@@ -429,6 +429,9 @@ proptest! {
         let nested = constellation("a", &[instance("0", &[("rz", 30.0)]), instance("0", &[("deltax", 0.1)])]);
         let mut bytes = amf(&(object("0", &POINTS, &FACES) + &nested)).into_bytes();
         for (place, byte, way) in changes {
+            if bytes.is_empty() {
+                break;
+            }
             let at = place.index(bytes.len());
             match way {
                 0 => bytes[at] = byte,

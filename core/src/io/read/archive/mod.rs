@@ -12,7 +12,7 @@
 //! Deflate is `flate2` on zlib-rs: Rust alone, and fast.
 
 #[cfg(test)]
-pub(super) mod build;
+pub(crate) mod build;
 mod central;
 mod end;
 mod entry;

@@ -22,7 +22,7 @@ fn every_way_to_write_a_triangle() {
         "OFF\n3 1\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2 17\n",
         "COFF\n3 1 0\n0 0 0 1 0 0 1\n1 0 0 1 0 0 1\n0 1 0 1 0 0 1\n3 0 1 2\n",
         "COFF\n3 1 0\n0 0 0 255 0 0\n1 0 0 255 0 0\n0 1 0 255 0 0\n3 0 1 2\n",
-"STCNOFF\n3 1 0\n0 0 0 0 0 1 1 0 0 1 0 0\n1 0 0 0 0 1 1 0 0 1 0 0\n0 1 0 0 0 1 1 0 0 1 0 0\n3 0 1 2\n",
+        "STCNOFF\n3 1 0\n0 0 0 0 0 1 1 0 0 1 0 0\n1 0 0 0 0 1 1 0 0 1 0 0\n0 1 0 0 0 1 1 0 0 1 0 0\n3 0 1 2\n",
         "OFF\n3 1 0\n0 0 0 1 0 0\n0 1 0\n3\n0 1\n2\n",
         "OFF 3 1 0 0 0 0 1 0 0 0 1 0 3 0 1 2",
     ] {
@@ -37,7 +37,7 @@ fn oddities_are_named() {
         ("3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n", "does not begin with \"OFF\""),
         ("OFF3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n", "no blank between \"OFF\" and the first count"),
         ("OFF\n3 2 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n", "cut off: the header announces 2 faces, the file holds 1"),
-        ("OFF\n3 2 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n3 0 1", "cut off: the header announces 2 faces, the file holds 1"),
+        ("OFF\n3 2 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n3 0 1", "1 line with too few numbers"),
         ("OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\nend\n", "4 bytes after the last face, ignored"),
     ] {
         let file = open(text.as_bytes()).unwrap();

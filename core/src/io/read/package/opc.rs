@@ -50,11 +50,6 @@ impl<'a> Opc<'a> {
         &self.archive.entries
     }
 
-    /// The relationships of a part, none if it has none.
-    pub(crate) fn relationships(&self, part: &str, context: &Context<'_>) -> Result<Vec<Relationship>> {
-        relationships(&self.archive, part, context)
-    }
-
     /// The content of a part, in a spool.
     ///
     /// # Errors

@@ -24,9 +24,9 @@ mod open;
 mod outline;
 mod scan;
 mod shards;
+pub(crate) mod slicer;
 #[cfg(test)]
 mod tests;
-pub(crate) mod slicer;
 mod transform;
 
 pub(crate) use mesh::MeshRecords;

@@ -48,7 +48,10 @@ pub(crate) fn volumes(text: &[u8]) -> Result<Vec<Volume>, Rejection> {
                 b"object" => object = value(&tag, b"id").and_then(|id| id.parse().ok()),
                 b"volume" => {
                     let Some(object) = object else { continue };
-                    all.push(volume(text, &tag, object).ok_or_else(|| refuse(format!("object {object} has a volume of no triangles")))?);
+                    all.push(
+                        volume(text, &tag, object)
+                            .ok_or_else(|| refuse(format!("object {object} has a volume of no triangles")))?,
+                    );
                     is_within = true;
                     if all.len() > MOST_VOLUMES {
                         return Err(refuse(format!("has more than {MOST_VOLUMES} volumes")));
@@ -90,7 +93,12 @@ fn volume(text: &str, tag: &BytesStart<'_>, object: u32) -> Option<Volume> {
         Some((number, from..from + bytes.len()))
     };
     let ((first, from), (last, to)) = (place("firstid")?, place("lastid")?);
-    (first <= last && last < u64::from(u32::MAX)).then(|| Volume { object, triangles: first..last + 1, is_part: true, places: [from, to] })
+    (first <= last && last < u64::from(u32::MAX)).then(|| Volume {
+        object,
+        triangles: first..last + 1,
+        is_part: true,
+        places: [from, to],
+    })
 }
 
 /// The text with other stretches; `ranges` are those of all volumes. One without triangles has no place in such a text: the caller keeps it from that.
@@ -128,13 +136,18 @@ mod tests {
         let said: Vec<_> = all.iter().map(|volume| (volume.object, volume.triangles.clone(), volume.is_part)).collect();
         assert_eq!(said, [(4, 0..12, true), (4, 12..100, false)]);
         let text = renumbered(TEXT.as_bytes(), &all, &[0..9, 9..97]);
-        let expected = TEXT.replace("lastid=\"11\"", "lastid=\"8\"").replace("firstid=\"12\" lastid=\"99\"", "firstid=\"9\" lastid=\"96\"");
+        let expected =
+            TEXT.replace("lastid=\"11\"", "lastid=\"8\"").replace("firstid=\"12\" lastid=\"99\"", "firstid=\"9\" lastid=\"96\"");
         assert_eq!(String::from_utf8(text).unwrap(), expected);
     }
 
     #[test]
     fn what_is_wrong_is_refused() {
-        for text in ["<config><object id='1'><volume firstid='5' lastid='4'/></object></config>", "<!DOCTYPE a><config/>", "<config><a></b>"] {
+        for text in [
+            "<config><object id='1'><volume firstid='5' lastid='4'/></object></config>",
+            "<!DOCTYPE a><config/>",
+            "<config><a></b>",
+        ] {
             assert!(volumes(text.as_bytes()).is_err(), "{text}");
         }
         assert_eq!(volumes(b"<config><object id='1'/></config>").unwrap(), []);

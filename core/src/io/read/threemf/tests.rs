@@ -8,7 +8,6 @@ use super::super::spool::Context;
 use super::build::{DECLARED, TETRAHEDRON, model, package};
 use super::model::{Content, Model, Place, Purpose, Unit};
 use super::transform::Transform;
-use super::*;
 use crate::contract::error::{Error, Result};
 use crate::contract::progress::Quiet;
 use crate::contract::settings::Limits;

@@ -1,0 +1,188 @@
+use std::path::Path;
+
+use crate::contract::report::{Outcome, Report};
+use crate::contract::settings::{KeepAttributes, Limits, Profile};
+use crate::io::read::archive_build::{Member, member, zip};
+use crate::io::read::{Archive, PackageFile};
+use crate::{Quiet, repair};
+
+const CORE: &str = "http://schemas.microsoft.com/3dmanufacturing/core/2015/02";
+const PRUSA: &str = "http://schemas.slic3r.org/3mf/2017/06";
+
+/// The triangles of a box, by its eight corners.
+const BOX: [[usize; 3]; 12] = [
+    [0, 2, 1],
+    [0, 3, 2],
+    [4, 5, 6],
+    [4, 6, 7],
+    [0, 1, 5],
+    [0, 5, 4],
+    [1, 2, 6],
+    [1, 6, 5],
+    [2, 3, 7],
+    [2, 7, 6],
+    [3, 0, 4],
+    [3, 4, 7],
+];
+
+fn corner(k: usize) -> [u32; 3] {
+    let [x, y] = [[0, 0], [10, 0], [10, 10], [0, 10]][k % 4];
+    [x, y, if k < 4 { 0 } else { 10 }]
+}
+
+fn vertices() -> String {
+    (0..8).map(corner).map(|[x, y, z]| format!("<vertex x=\"{x}.0\" y=\"{y}.0\" z=\"{z}.0\"/>")).collect()
+}
+
+/// Triangles with the attributes that `painted` gives for each.
+fn triangles(of: &[[usize; 3]], painted: impl Fn(usize) -> String) -> String {
+    of.iter().enumerate().map(|(k, [a, b, c])| format!("<triangle v1=\"{a}\" v2=\"{b}\" v3=\"{c}\"{}/>\n", painted(k))).collect()
+}
+
+fn object(id: u32, vertices: &str, triangles: &str) -> String {
+    format!(
+        "<object id=\"{id}\" name=\"part {id}\" type=\"model\"><mesh><vertices>{vertices}</vertices><triangles>{triangles}</triangles></mesh></object>"
+    )
+}
+
+/// A package of these objects, with parts that a reader does not know.
+fn package(objects: &[String], others: &[Member]) -> Vec<u8> {
+    let items: String = (1..=objects.len()).map(|id| format!("<item objectid=\"{id}\"/>")).collect();
+    let model = format!(
+        "<?xml version=\"1.0\"?>\n<model unit=\"millimeter\" xmlns=\"{CORE}\" xmlns:slic3rpe=\"{PRUSA}\"><resources>{}</resources><build>{items}</build></model>",
+        objects.concat()
+    );
+    let relationships = "<Relationships xmlns='http://schemas.openxmlformats.org/package/2006/relationships'>\
+        <Relationship Id='r' Type='http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel' Target='/3D/3dmodel.model'/></Relationships>";
+    let types = "<Types xmlns='http://schemas.openxmlformats.org/package/2006/content-types'/>";
+    let mut all =
+        vec![member("[Content_Types].xml", types), member("_rels/.rels", relationships), member("3D/3dmodel.model", model)];
+    all.extend(others.iter().cloned());
+    zip(&all)
+}
+
+/// What a repair made of a package: its report, and the text of an entry.
+struct Repaired {
+    folder: tempfile::TempDir,
+    report: Report,
+}
+
+impl Repaired {
+    fn of(package: &[u8], profile: &Profile) -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        let (input, output) = (folder.path().join("in.3mf"), folder.path().join("out.3mf"));
+        std::fs::write(&input, package).unwrap();
+        let limits = Limits { threads: 2, ..Limits::default() };
+        let report = repair(&input, &output, profile, &limits, &Quiet).unwrap();
+        Self { folder, report }
+    }
+
+    fn bytes(&self) -> Vec<u8> {
+        std::fs::read(self.folder.path().join("out.3mf")).unwrap()
+    }
+
+    fn text(&self) -> String {
+        let limits = Limits { spool: Some(self.folder.path().into()), ..Limits::default() };
+        let package = PackageFile::open(&self.folder.path().join("out.3mf"), &limits, &Quiet).unwrap().unwrap();
+        String::from_utf8(package.text(0).to_vec()).unwrap()
+    }
+}
+
+/// Bytes of an entry as they are held.
+fn raw(package: &[u8], name: &str) -> Vec<u8> {
+    let archive = Archive::open(package).map_err(|rejection| rejection.at(Path::new("a"))).unwrap();
+    package[archive.find(name).unwrap().whole.clone()].to_vec()
+}
+
+fn mmu(code: &str) -> String {
+    format!(" slic3rpe:mmu_segmentation=\"{code}\"")
+}
+
+#[test]
+fn a_hole_is_filled_in_the_colour_of_its_rim_and_all_else_stays() {
+    let open = object(1, &vertices(), &triangles(&BOX[..11], |_| mmu("8")));
+    let whole = object(2, &vertices(), &triangles(&BOX, |k| mmu(["4", "8"][k % 2])));
+    let others = [member("Metadata/thumbnail.png", b"\x89PNG"), member("Metadata/strange.bin", [7; 5000])];
+    let input = package(&[open.clone(), whole.clone()], &others);
+    let repaired = Repaired::of(&input, &Profile::default());
+    let (report, text) = (&repaired.report, repaired.text());
+    assert_eq!((report.outcome, report.objects.len()), (Outcome::Repaired, 2), "{:?}", report.verdict);
+    assert_eq!(report.objects.iter().map(|object| object.outcome).collect::<Vec<_>>(), [Outcome::Repaired, Outcome::Clean]);
+    assert!(text.contains(&whole), "{text}");
+    let (before, after) = open.split_at(open.find("\n</triangles>").unwrap());
+    let rest = text.split_once(before).unwrap().1;
+    let (new, behind) = rest.split_at(rest.find("\n</triangles>").unwrap());
+    assert!(behind.starts_with(after), "{behind}");
+    assert!(new.starts_with("\n<triangle v1=") && new.ends_with(" slic3rpe:mmu_segmentation=\"8\"/>"), "{new}");
+    let attributes = report.attributes.unwrap();
+    assert_eq!((attributes.kept, attributes.inherited, attributes.lost), (23, 1, 0));
+    for name in ["[Content_Types].xml", "_rels/.rels", "Metadata/thumbnail.png", "Metadata/strange.bin"] {
+        assert_eq!(raw(&input, name), raw(&repaired.bytes(), name), "{name}");
+    }
+}
+
+#[test]
+fn a_good_package_is_copied() {
+    let input = package(&[object(1, &vertices(), &triangles(&BOX, |_| String::new()))], &[]);
+    let repaired = Repaired::of(&input, &Profile::default());
+    assert_eq!((repaired.report.outcome, repaired.bytes()), (Outcome::Clean, input));
+}
+
+/// Its second and third corner change places, and their colours with them.
+#[test]
+fn a_triangle_that_was_turned_keeps_its_colours() {
+    let mut turned = BOX;
+    turned[5].swap(1, 2);
+    let coloured = |k: usize| if k == 5 { " pid=\"9\" p1=\"0\" p2=\"1\" p3=\"2\"".into() } else { String::new() };
+    let input = package(&[object(1, &vertices(), &triangles(&turned, coloured))], &[]);
+    let repaired = Repaired::of(&input, &Profile::default());
+    let expected = triangles(&BOX, |k| if k == 5 { " pid=\"9\" p1=\"0\" p2=\"2\" p3=\"1\"".into() } else { String::new() });
+    assert!(repaired.text().contains(&expected), "{}", repaired.text());
+}
+
+/// Consumers of 3MF tell vertices apart by number: what is closed by position is open to them.
+#[test]
+fn vertices_at_one_position_become_one() {
+    let positions: String =
+        BOX.iter().flatten().map(|k| corner(*k)).map(|[x, y, z]| format!("<vertex x=\"{x}\" y=\"{y}\" z=\"{z}\"/>")).collect();
+    let own: Vec<[usize; 3]> = (0..12).map(|k| [3 * k, 3 * k + 1, 3 * k + 2]).collect();
+    let input = package(&[object(1, &positions, &triangles(&own, |_| mmu("4")))], &[]);
+    let repaired = Repaired::of(&input, &Profile::default());
+    assert_eq!(repaired.report.outcome, Outcome::Repaired);
+    let first = |k: usize| BOX.iter().flatten().position(|other| *other == k).unwrap();
+    let expected = BOX.map(|triangle| triangle.map(first));
+    assert!(repaired.text().contains(&triangles(&expected, |_| mmu("4"))), "{}", repaired.text());
+}
+
+#[test]
+fn volumes_of_a_project_are_meshes_of_their_own() {
+    // Two boxes that share a side, each with vertices of its own, the first without its last triangle.
+    let second: String = (0..8).map(corner).map(|[x, y, z]| format!("<vertex x=\"{}\" y=\"{y}\" z=\"{z}\"/>", x + 10)).collect();
+    let mut both = BOX[..11].to_vec();
+    both.extend(BOX.map(|triangle| triangle.map(|k| k + 8)));
+    let config = "<config><object id=\"1\"><volume firstid=\"0\" lastid=\"10\"/><volume firstid=\"11\" lastid=\"22\">\
+        <metadata type=\"volume\" key=\"volume_type\" value=\"ParameterModifier\"/></volume></object></config>";
+    let others = [member("Metadata/Slic3r_PE_model.config", config)];
+    let input = package(&[object(1, &[vertices(), second].concat(), &triangles(&both, |_| String::new()))], &others);
+    let repaired = Repaired::of(&input, &Profile::default());
+    assert_eq!(repaired.report.outcome, Outcome::Repaired, "{:?}", repaired.report.verdict);
+    let limits = Limits { spool: Some(repaired.folder.path().into()), ..Limits::default() };
+    let package = PackageFile::open(&repaired.folder.path().join("out.3mf"), &limits, &Quiet).unwrap().unwrap();
+    let ranges: Vec<_> = package.volumes().iter().map(|volume| volume.triangles.clone()).collect();
+    assert_eq!(ranges, [0..12, 12..24]);
+}
+
+#[test]
+fn a_profile_may_refuse_to_lose_attributes() {
+    // A degenerate triangle with paint goes, and nothing is left of it.
+    let mut more = BOX.to_vec();
+    more.push([0, 0, 1]);
+    let input = package(&[object(1, &vertices(), &triangles(&more, |_| mmu("4")))], &[]);
+    let outcome = |attributes| {
+        let repaired = Repaired::of(&input, &Profile { attributes, ..Profile::default() });
+        (repaired.report.outcome, repaired.report.output.is_some())
+    };
+    assert_eq!(outcome(KeepAttributes::Best), (Outcome::Repaired, true));
+    assert_eq!(outcome(KeepAttributes::Keep), (Outcome::NeedsReview, true));
+    assert_eq!(outcome(KeepAttributes::Refuse), (Outcome::NotGood, false));
+}

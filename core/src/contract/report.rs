@@ -190,6 +190,9 @@ pub struct FileFacts {
     pub blake3: String,
     /// The format that it was read from.
     pub format: Format,
+    /// The unit of its coordinates, where the file says one; nothing is scaled.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub unit: Option<String>,
     /// Triangle records in the file, non-finite and degenerate ones included.
     pub triangles: u64,
     /// What is odd about the file itself, in the reader's words; empty for a flawless file.

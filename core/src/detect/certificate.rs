@@ -125,6 +125,7 @@ mod tests {
             bytes: 684,
             blake3: "ab".into(),
             format: Format::BinaryStl,
+            unit: None,
             triangles: 12,
             findings: Vec::new(),
         }

@@ -101,7 +101,7 @@ pub(crate) fn repair(input: &Path, output: &Path, profile: &Profile, limits: &Li
     }
     let mesh = open(input, limits, progress)?;
     let triangles = mesh.records().len();
-    let target = formats::target(mesh.format(), profile.format);
+    let target = formats::target(mesh.format(), mesh.unit(), profile.format);
     let report = match target.layout {
         None => make(mesh, output, target, (profile, limits), progress, &mut clock)?.report,
         Some(layout) => {
@@ -415,6 +415,7 @@ pub(crate) fn facts(mesh: &MeshFile, blake3: String) -> FileFacts {
         bytes: mesh.byte_len(),
         blake3,
         format: mesh.format(),
+        unit: mesh.unit().map(String::from),
         triangles: mesh.records().len() as u64,
         findings: mesh.findings().iter().map(|f| f.text.clone()).collect(),
     }

@@ -36,24 +36,33 @@ pub(crate) struct Target {
 }
 
 /// The format of the result of an input of this format, where the profile wants `wanted`.
-pub(crate) fn target(input: Format, wanted: OutputFormat) -> Target {
-    let own = layout_of(input);
+pub(crate) fn target(input: Format, unit: Option<&'static str>, wanted: OutputFormat) -> Target {
+    let own = layout_of(input, unit);
     let layout = match wanted {
         OutputFormat::Input => own,
         OutputFormat::Stl => None,
         OutputFormat::Ply => Some(Layout::Ply),
         OutputFormat::Off => Some(Layout::Off),
         OutputFormat::Obj => Some(Layout::Obj),
-        OutputFormat::Amf => Some(Layout::Amf("millimeter")),
+        OutputFormat::Amf => Some(amf(unit)),
     };
     Target { layout, is_input: layout == own && input != Format::ThreeMf }
 }
 
-fn layout_of(format: Format) -> Option<Layout> {
+/// AMF has no centimeter, and another name for the foot; a file without a unit is one of millimeters to all printers.
+fn amf(unit: Option<&'static str>) -> Layout {
+    Layout::Amf(match unit {
+        Some(unit @ ("inch" | "meter" | "micron")) => unit,
+        Some("feet" | "foot") => "feet",
+        _ => "millimeter",
+    })
+}
+
+fn layout_of(format: Format, unit: Option<&'static str>) -> Option<Layout> {
     match format {
         // A package is written around its own text.
         Format::BinaryStl | Format::AsciiStl | Format::ThreeMf | Format::Memory => None,
-        Format::Amf => Some(Layout::Amf("millimeter")),
+        Format::Amf => Some(amf(unit)),
         Format::Obj => Some(Layout::Obj),
         Format::Ply => Some(Layout::Ply),
         Format::Off => Some(Layout::Off),
@@ -114,7 +123,7 @@ pub(crate) fn convert(
 ) -> Result<Converted> {
     let limits = &limits.spooling_beside(output);
     let mesh = files::open(input, limits, progress)?;
-    let target = target(mesh.format(), format);
+    let target = target(mesh.format(), mesh.unit(), format);
     check_space(&mesh, output, target.layout, limits)?;
     let written = match target.layout {
         Some(layout) if !target.is_input => {
@@ -194,7 +203,7 @@ mod tests {
 
     #[test]
     fn the_profile_decides_and_else_the_input() {
-        let of = |wanted| target(Format::AsciiStl, wanted);
+        let of = |wanted| target(Format::AsciiStl, None, wanted);
         assert_eq!(of(OutputFormat::Ply), Target { layout: Some(Layout::Ply), is_input: false });
         assert_eq!([of(OutputFormat::Input), of(OutputFormat::Stl)], [Target { layout: None, is_input: true }; 2]);
     }

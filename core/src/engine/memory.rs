@@ -73,6 +73,7 @@ fn facts(records: &[Record], blake3: String) -> FileFacts {
         bytes: (PREFIX_BYTES + size_of_val(records)) as u64,
         blake3,
         format: Format::Memory,
+        unit: None,
         triangles: records.len() as u64,
         findings: Vec::new(),
     }

@@ -188,6 +188,7 @@ fn facts(package: &PackageFile, blake3: String, triangles: u64) -> FileFacts {
         bytes: package.bytes().len() as u64,
         blake3,
         format: Format::ThreeMf,
+        unit: Some(package.unit().into()),
         triangles,
         findings: package.findings().iter().map(|finding| finding.text.clone()).collect(),
     }

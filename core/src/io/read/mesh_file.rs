@@ -40,6 +40,7 @@ pub struct MeshFile {
     format: Format,
     findings: Vec<Finding>,
     header: [u8; HEADER_BYTES],
+    unit: Option<&'static str>,
 }
 
 /// What the bytes of a file hold.
@@ -48,6 +49,7 @@ struct Content {
     format: Format,
     findings: Vec<Finding>,
     header: [u8; HEADER_BYTES],
+    unit: Option<&'static str>,
 }
 
 impl Content {
@@ -56,7 +58,7 @@ impl Content {
             sniff::Kind::Binary(sniff::Layout { triangles, mut findings }) => {
                 findings.extend(tail::of_records(binary::records(input, triangles)));
                 let header = binary::safe_header(binary::header(input));
-                Ok(Self { source: Source::InPlace(triangles), format: Format::BinaryStl, findings, header })
+                Ok(Self { source: Source::InPlace(triangles), format: Format::BinaryStl, findings, header, unit: None })
             }
             sniff::Kind::Text(sniff::Text { start, mut findings }) => {
                 // Advice; without it reading ahead is only less bold.
@@ -95,9 +97,9 @@ impl Content {
 
     /// `findings`: those of the bytes themselves.
     fn parsed(parsed: Parsed, format: Format, findings: Vec<Finding>) -> Self {
-        let Parsed { records, findings: mut found, header, rounding } = parsed;
+        let Parsed { records, findings: mut found, header, rounding, unit } = parsed;
         found.extend(rounding.map(Rounding::finding));
-        Self { source: Source::Spooled(records), format, findings: [findings, found].concat(), header }
+        Self { source: Source::Spooled(records), format, findings: [findings, found].concat(), header, unit }
     }
 }
 
@@ -114,8 +116,8 @@ impl MeshFile {
         let (opened, input, file) = Opened::bytes(path, spool, limits, progress)?;
         let kind = sniff::sniff(&input).map_err(|rejection| rejection.at(path))?;
         let content = Content::of(kind, &input, &Context { path, spool, limits, progress })?;
-        let Content { source, format, findings, header } = content;
-        Ok(Self { opened, name: path.to_owned(), file, input, source, format, findings, header })
+        let Content { source, format, findings, header, unit } = content;
+        Ok(Self { opened, name: path.to_owned(), file, input, source, format, findings, header, unit })
     }
 
     /// The triangles in input order, those with NaN or infinite coordinates included.
@@ -152,6 +154,11 @@ impl MeshFile {
     /// The format that the file was read as.
     pub fn format(&self) -> Format {
         self.format
+    }
+
+    /// The name of the unit of all coordinates, where the file says one. Nothing is scaled.
+    pub fn unit(&self) -> Option<&'static str> {
+        self.unit
     }
 
     /// Oddities of the file; none of a flawless one.

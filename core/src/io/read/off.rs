@@ -49,7 +49,7 @@ pub(super) fn read(bytes: &[u8], context: &Context<'_>) -> Result<Parsed> {
     } else {
         tail::behind_text(whole, zeros)
     });
-    Ok(Parsed { records: faces.map()?, findings, header: binary::header_of(b""), rounding: gathered.1 })
+    Ok(Parsed { records: faces.map()?, findings, header: binary::header_of(b""), rounding: gathered.1, unit: None })
 }
 
 /// Whether `bytes` begin with a keyword of OFF, after blanks and comments.

@@ -10,9 +10,9 @@ use super::binary;
 use super::finding::{Finding, Rejection};
 use super::opened::Opened;
 use super::rounding::Rounding;
-use super::spool::{Context, Parsed};
+use super::spool::{Context, Parsed, Spool};
 use super::threemf::slicer::{self, Volume};
-use super::threemf::{Content, MeshRecords, Model, Object, Place, Purpose};
+use super::threemf::{Content, MeshRecords, Model, Object, Place, Purpose, Transform};
 use crate::contract::error::Result;
 use crate::contract::progress::Progress;
 use crate::contract::settings::Limits;
@@ -133,6 +133,11 @@ impl PackageFile {
         self.config.as_ref().map(|(entry, text)| (*entry, text.as_slice()))
     }
 
+    /// The name of the unit of all coordinates.
+    pub(crate) fn unit(&self) -> &'static str {
+        self.model.unit().name()
+    }
+
     /// The package has a digital signature.
     pub(crate) fn is_signed(&self) -> bool {
         self.model.signed
@@ -190,18 +195,25 @@ fn left_alone(model: &Model) -> Vec<Finding> {
         let objects = Counted(count, "object stays as it is", "objects stay as they are");
         (count > 0).then(|| Finding { harmless: true, ..Finding::flaw(format!("{objects}: {words}")) })
     };
-    [line(supports, "support, surface or other, which needs to be no solid"), line(foreign, "no mesh of triangles alone")]
-        .into_iter()
-        .flatten()
-        .collect()
+    let unprinted = model.items().iter().filter(|item| !item.printable).count() as u64;
+    let unprinted = (unprinted > 0).then(|| {
+        let text = format!("{} of the build not to be printed, and repaired all the same", Counted(unprinted, "item", "items"));
+        Finding { harmless: true, ..Finding::flaw(text) }
+    });
+    [
+        unprinted,
+        line(supports, "support, surface or other, which needs to be no solid"),
+        line(foreign, "no mesh of triangles alone"),
+    ]
+    .into_iter()
+    .flatten()
+    .collect()
 }
 
 /// All that is built, as one mesh: each object where build items and components place it.
 pub(super) fn built(model: &Model, context: &Context<'_>) -> Result<Parsed> {
-    let mut spool = context.records()?;
-    let mut findings = model.findings.clone();
-    let mut rounding = Rounding::default();
-    let mut last: Option<(Place, MeshRecords)> = None;
+    let (spool, findings) = (context.records()?, model.findings.clone());
+    let mut placing = Placing { model, context, spool, findings, rounding: Rounding::default(), last: None };
     let mut failed = Ok(());
     for item in model.items() {
         model.instances(item, |place, transform| {
@@ -209,30 +221,51 @@ pub(super) fn built(model: &Model, context: &Context<'_>) -> Result<Parsed> {
             if failed.is_err() || !is_repaired(object) {
                 return;
             }
-            let mut add = || -> Result<()> {
-                if last.as_ref().is_none_or(|(there, _)| *there != place) {
-                    let read = model.records(place, context)?;
-                    findings.extend(read.parsed.findings.iter().cloned());
-                    last = Some((place, read));
-                }
-                let records = last.as_ref().map_or(&[][..], |(_, read)| read.parsed.records.all());
-                for chunk in records.chunks(PLACED) {
-                    let placed: Vec<Record> = chunk.iter().map(|record| placed(record, transform, &mut rounding)).collect();
-                    spool.append(&placed)?;
-                }
-                context.at(spool.count(), spool.count())
-            };
-            failed = add();
+            failed = placing.add(place, transform);
         });
     }
     failed?;
+    let Placing { spool, findings, rounding, .. } = placing;
     if spool.count() == 0 {
         return Err(binary::no_triangles().at(context.path));
     }
-    Ok(Parsed { records: spool.map()?, findings, header: binary::header_of(b""), rounding: rounding.if_any() })
+    Ok(Parsed {
+        records: spool.map()?,
+        findings,
+        header: binary::header_of(b""),
+        rounding: rounding.if_any(),
+        unit: Some(model.unit().name()),
+    })
 }
 
-fn placed(record: &Record, transform: &super::threemf::Transform, rounding: &mut Rounding) -> Record {
+/// Objects on their way to where they are built.
+struct Placing<'a> {
+    model: &'a Model,
+    context: &'a Context<'a>,
+    spool: Spool<'a, 50>,
+    findings: Vec<Finding>,
+    rounding: Rounding,
+    /// The object that was placed last: often it is placed again.
+    last: Option<(Place, MeshRecords)>,
+}
+
+impl Placing<'_> {
+    fn add(&mut self, place: Place, transform: &Transform) -> Result<()> {
+        if self.last.as_ref().is_none_or(|(there, _)| *there != place) {
+            let read = self.model.records(place, self.context)?;
+            self.findings.extend(read.parsed.findings.iter().cloned());
+            self.last = Some((place, read));
+        }
+        let records = self.last.as_ref().map_or(&[][..], |(_, read)| read.parsed.records.all());
+        for chunk in records.chunks(PLACED) {
+            let placed: Vec<Record> = chunk.iter().map(|record| placed(record, transform, &mut self.rounding)).collect();
+            self.spool.append(&placed)?;
+        }
+        self.context.at(self.spool.count(), self.spool.count())
+    }
+}
+
+fn placed(record: &Record, transform: &Transform, rounding: &mut Rounding) -> Record {
     if transform.is_identity() {
         return *record;
     }

@@ -33,6 +33,8 @@ pub(crate) struct Parsed {
     pub(crate) header: [u8; HEADER_BYTES],
     /// How far coordinates were moved to be `f32`, where the file holds finer ones.
     pub(crate) rounding: Option<Rounding>,
+    /// The name of the unit of all coordinates, where the file says one.
+    pub(crate) unit: Option<&'static str>,
 }
 
 /// Paths, limits and progress of a reading.

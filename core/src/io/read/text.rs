@@ -33,7 +33,7 @@ pub(super) fn read(text: &[u8], start: usize, context: &Context<'_>) -> Result<P
     };
     context.in_order(text.len() as u64, next, parse, take)?;
     judge(&tally, spool.count()).map_err(reject)?;
-    Ok(Parsed { records: spool.map()?, findings: findings(&tally), header: header(&tally), rounding: None })
+    Ok(Parsed { records: spool.map()?, findings: findings(&tally), header: header(&tally), rounding: None, unit: None })
 }
 
 /// Bytes of records that a text will make, if it goes on as it begins.

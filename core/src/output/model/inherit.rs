@@ -100,7 +100,7 @@ fn properties<'t>(element: &Element<'t>) -> [Option<&'t [u8]>; 3] {
 }
 
 /// The property of the corner that weighs most; the first of equals.
-fn nearest<'t>(own: [Option<&'t [u8]>; 3], [a, b, c]: [f64; 3]) -> Option<&'t [u8]> {
+fn nearest(own: [Option<&[u8]>; 3], [a, b, c]: [f64; 3]) -> Option<&[u8]> {
     if a >= b && a >= c {
         own[0]
     } else if b >= c {

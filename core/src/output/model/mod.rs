@@ -149,7 +149,7 @@ impl Writer<'_, '_> {
             text.extend_from_slice(b"<");
             text.extend_from_slice(prefix);
             // Writing to a vector cannot fail.
-            let _ = write!(text, "vertex x=\"{x}\" y=\"{y}\" z=\"{z}\"/>\n");
+            let _ = writeln!(text, "vertex x=\"{x}\" y=\"{y}\" z=\"{z}\"/>");
         }
         self.put(&text);
         self.copy_to(self.mesh.triangles.start);

@@ -89,7 +89,21 @@ pub(super) fn read(text: &[u8], context: &Context<'_>) -> Result<Parsed> {
     findings.extend(of_placement(&document, &names, &placed));
     let name = if document.name.is_empty() { &document.name_of_object } else { &document.name };
     let header = binary::header_of(name);
-    Ok(Parsed { records: placed.records, findings, header, rounding: placed.rounding.if_any() })
+    Ok(Parsed { records: placed.records, findings, header, rounding: placed.rounding.if_any(), unit: unit_of(&document) })
+}
+
+/// The name of the unit, if it is one of AMF's.
+fn unit_of(document: &Document) -> Option<&'static str> {
+    let unit = document.unit.as_deref().unwrap_or(b"millimeter");
+    let known = [
+        ("millimeter", "millimeter"),
+        ("inch", "inch"),
+        ("feet", "feet"),
+        ("foot", "feet"),
+        ("meter", "meter"),
+        ("micron", "micron"),
+    ];
+    known.into_iter().find(|(name, _)| name.as_bytes() == unit).map(|(_, unit)| unit)
 }
 
 /// What is odd about the declared encoding; a refusal of one that does not hold ASCII as it is.

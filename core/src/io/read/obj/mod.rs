@@ -123,7 +123,7 @@ pub(super) fn read(bytes: &[u8], start: usize, context: &Context<'_>) -> Result<
     }
     let mut findings = findings(bytes, &found, cut_off);
     findings.extend(tally.findings());
-    Ok(Parsed { records: records.map()?, findings, header: header(&found), rounding: found.rounding.if_any() })
+    Ok(Parsed { records: records.map()?, findings, header: header(&found), rounding: found.rounding.if_any(), unit: None })
 }
 
 fn windows_at_a_time() -> usize {

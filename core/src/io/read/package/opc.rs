@@ -14,7 +14,6 @@ const USUAL_START: &str = "3D/3dmodel.model";
 const SIGNATURES: &str = "http://schemas.openxmlformats.org/package/2006/relationships/digital-signature/origin";
 /// Every part that is encrypted begins with this (3MF Secure Content 1.0.2, 2.3), whatever the relationships and the keystore say.
 const ENCRYPTED: &[u8] = b"%3McF";
-const KEYSTORE: &str = "http://schemas.microsoft.com/3dmanufacturing/2019/04/keystore";
 
 /// A package.
 pub(crate) struct Opc<'a> {
@@ -23,8 +22,6 @@ pub(crate) struct Opc<'a> {
     pub(crate) start: String,
     /// There are digital signatures, which no changed package keeps.
     pub(crate) signed: bool,
-    /// There is a keystore: some parts may be encrypted.
-    pub(crate) keystore: bool,
     pub(crate) findings: Vec<Finding>,
 }
 
@@ -42,7 +39,7 @@ impl<'a> Opc<'a> {
         let root = relationships(&archive, "", context)?;
         let start = start(&archive, &root, &mut findings).map_err(reject)?;
         let has = |kind: &str| root.iter().any(|relationship| relationship.kind == kind);
-        Ok(Self { signed: has(SIGNATURES), keystore: has(KEYSTORE), archive, start, findings })
+        Ok(Self { signed: has(SIGNATURES), archive, start, findings })
     }
 
     /// The entries of the archive, in its order.

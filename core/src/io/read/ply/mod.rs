@@ -210,6 +210,6 @@ impl<'a> Reading<'a, '_> {
             self.findings.push(Finding { harmless: true, ..Finding::flaw(text) });
         }
         let header = binary::header_of(b"");
-        Ok(Parsed { records: faces.map()?, findings: self.findings, header, rounding: positions.rounding })
+        Ok(Parsed { records: faces.map()?, findings: self.findings, header, rounding: positions.rounding, unit: None })
     }
 }

@@ -20,6 +20,20 @@ pub(crate) enum Unit {
     Meter,
 }
 
+impl Unit {
+    /// As 3MF writes it.
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::Micron => "micron",
+            Self::Millimeter => "millimeter",
+            Self::Centimeter => "centimeter",
+            Self::Inch => "inch",
+            Self::Foot => "foot",
+            Self::Meter => "meter",
+        }
+    }
+}
+
 /// What an object is for (3MF Core 4).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Purpose {
@@ -65,8 +79,6 @@ pub(crate) struct Object {
     pub(crate) part_number: String,
     pub(crate) uuid: String,
     pub(crate) thumbnail: String,
-    /// `pid` and `pindex`, as they stand.
-    pub(crate) property: [Option<u32>; 2],
     /// Where `<object …>…</object>` stands in the part.
     pub(crate) whole: Range<usize>,
     pub(crate) content: Content,
@@ -125,8 +137,6 @@ pub(crate) struct Item {
     pub(crate) printable: bool,
     pub(crate) part_number: String,
     pub(crate) uuid: String,
-    /// Where its tag stands in the first part.
-    pub(crate) tag: Range<usize>,
 }
 
 /// An object of a model: the number of its part, and its number in it.
@@ -147,8 +157,6 @@ pub(crate) struct Model {
     pub(super) by_name: HashMap<String, usize>,
     /// There are digital signatures, which no changed package keeps.
     pub(crate) signed: bool,
-    /// There is a keystore (3MF Secure Content).
-    pub(crate) secured: bool,
     pub(crate) findings: Vec<Finding>,
 }
 

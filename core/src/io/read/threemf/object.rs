@@ -20,7 +20,6 @@ pub(super) fn read(xml: &mut Xml<'_>, element: &Element<'_>, budget: &mut Budget
         part_number: attributes.text("partnumber")?,
         uuid: attributes.production("UUID")?,
         thumbnail: attributes.text("thumbnail")?,
-        property: [attributes.id("pid")?, attributes.id("pindex")?],
         whole: element.tag.clone(),
         content: Content::Nothing,
     };

@@ -41,8 +41,7 @@ impl Model {
             parts.push(part);
         }
         let entries = package.entries().to_vec();
-        let mut model =
-            Self { entries, parts, by_name, signed: package.signed, secured: package.keystore, findings: package.findings };
+        let mut model = Self { entries, parts, by_name, signed: package.signed, findings: package.findings };
         if model.parts.iter().any(|part| part.draft) {
             model.findings.push(Finding::flaw("a model of the draft 0.93 of 3MF"));
         }

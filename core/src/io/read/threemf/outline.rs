@@ -119,7 +119,6 @@ fn build(xml: &mut Xml<'_>, part: &mut Part, budget: &mut Budget) -> Result<(), 
                 printable: !matches!(printable.as_deref().map(str::trim), Some("0" | "false")),
                 part_number: attributes.text("partnumber")?,
                 uuid: attributes.production("UUID")?,
-                tag: child.tag.clone(),
             };
             budget.spend(xml, item.part_number.len() + item.uuid.len() + item.component.path.as_ref().map_or(0, String::len))?;
             part.items.push(item);

@@ -33,8 +33,6 @@ pub(crate) struct Element<'a> {
     pub(crate) name: &'a str,
     /// Where its start tag stands in the part.
     pub(crate) tag: Range<usize>,
-    /// It is a tag of its own, without content.
-    pub(crate) empty: bool,
     attributes: Vec<Attribute<'a>>,
 }
 
@@ -45,7 +43,7 @@ fn split(name: &str) -> (&str, &str) {
 
 impl<'a> Element<'a> {
     /// Reads a tag, without its brackets. Namespaces that it declares are added to `scopes`. An error says what is wrong with it.
-    pub(super) fn read(inner: &'a str, tag: Range<usize>, empty: bool, scopes: &mut Scopes) -> Result<Self, String> {
+    pub(super) fn read(inner: &'a str, tag: Range<usize>, scopes: &mut Scopes) -> Result<Self, String> {
         let name_end = inner.find(|c: char| c.is_ascii_whitespace()).unwrap_or(inner.len());
         let raw_name = inner.get(..name_end).unwrap_or_default();
         let mut raw: Vec<(&str, &str)> = Vec::new();
@@ -75,7 +73,7 @@ impl<'a> Element<'a> {
         };
         let attributes = raw.into_iter().map(resolve).collect();
         let (prefix, name) = split(raw_name);
-        Ok(Self { namespace: scopes.namespace(prefix), raw_name, name, tag, empty, attributes })
+        Ok(Self { namespace: scopes.namespace(prefix), raw_name, name, tag, attributes })
     }
 
     /// This element of this namespace.

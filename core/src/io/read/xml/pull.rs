@@ -244,7 +244,7 @@ impl<'a> Xml<'a> {
         let Ok(inner) = std::str::from_utf8(inner) else {
             return Err(self.damaged(tag.start, "a tag that is no UTF-8"));
         };
-        let element = Element::read(inner, tag.clone(), empty, &mut self.scopes);
+        let element = Element::read(inner, tag.clone(), &mut self.scopes);
         element.map(Node::Start).map_err(|reason| self.damaged(tag.start, format!("a tag that {reason}")))
     }
 

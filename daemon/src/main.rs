@@ -86,6 +86,7 @@ mod url;
 mod watch;
 mod watchdog;
 mod web;
+mod whole;
 mod window;
 mod worker;
 mod world;

@@ -19,7 +19,8 @@ use crate::fsx::{self, Identity};
 use crate::handed::{Handed, Untaken};
 use crate::profiles;
 use crate::settings::Settings;
-use crate::settle::{Look, Rest, Settling, length_fits};
+use crate::settle::{Look, Rest, Settling};
+use crate::whole::is_whole;
 use crate::writers::Writers;
 
 /// Sub-folders are searched to this depth: more than a path that a record can hold has room for in practice.
@@ -130,7 +131,7 @@ impl Reconciler {
             let rests = match state.look(identity, now, self.rest) {
                 Look::Wait => false,
                 Look::IfLengthFits => {
-                    foreign.is_some() || Original::open(&full).and_then(|file| length_fits(file.file())).unwrap_or(false)
+                    foreign.is_some() || Original::open(&full).and_then(|file| is_whole(file.file())).unwrap_or(false)
                 }
                 Look::Ready => true,
             };
@@ -294,7 +295,7 @@ fn complete(inbox: &Path, below: &Path) -> Result<Identity, Untaken> {
     }
     let file = Original::open(&full).map_err(unseen)?;
     let identity = file.identity().map_err(unseen)?;
-    let whole = length_fits(file.file()).map_err(unseen)? && !Writers::default().has(file.file(), &identity);
+    let whole = is_whole(file.file()).map_err(unseen)? && !Writers::default().has(file.file(), &identity);
     if whole { Ok(identity) } else { Err(Untaken::Unfinished) }
 }
 

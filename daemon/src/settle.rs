@@ -1,9 +1,7 @@
 //! When is a dropped file complete? When nothing about it has changed for a while, over several looks, and its length is one
 //! that a complete file of its format has. A file whose length never fits (cut short for good, or not a mesh at all) is taken
-//! too, after a longer rest. Pure but for [`length_fits`]; time comes from outside, and is monotonic.
+//! too, after a longer rest. Pure: time comes from outside, and is monotonic.
 
-use std::fs::File;
-use std::io::{self, Read, Seek, SeekFrom};
 use std::time::{Duration, Instant};
 
 use crate::fsx::Identity;
@@ -15,8 +13,6 @@ const DOUBT: u32 = 6;
 
 /// A file that some program keeps open for writing is spoken of after so long.
 const TELL_AFTER: Duration = Duration::from_secs(600);
-/// So many zeros at the end, eight records of them, are no triangles.
-const ZEROS: usize = 8 * 50;
 
 /// How long a file must rest.
 #[derive(Clone, Copy, Debug)]
@@ -112,36 +108,6 @@ impl Settling {
     }
 }
 
-/// Has the file a length that a complete STL has: 84 bytes and 50 for each triangle that its header announces, or text whose end
-/// says `endsolid`? And does it not end in zeros, as one does whose size was set before it was written? Reads 1.1 KB at most.
-///
-/// # Errors
-/// As `read`.
-pub(crate) fn length_fits(mut file: &File) -> io::Result<bool> {
-    let size = file.metadata()?.len();
-    let mut head = [0; 84];
-    let mut announced = None;
-    file.seek(SeekFrom::Start(0))?;
-    if size >= 84 {
-        file.read_exact(&mut head)?;
-        let [.., a, b, c, d] = head;
-        announced = Some(84 + 50 * u64::from(u32::from_le_bytes([a, b, c, d])));
-    }
-    let tail_len = size.min(1024);
-    file.seek(SeekFrom::Start(size - tail_len))?;
-    let mut tail = Vec::new();
-    file.take(tail_len).read_to_end(&mut tail)?;
-    let zeros = tail.iter().rev().take_while(|byte| **byte == 0).count();
-    Ok((announced == Some(size) && zeros < ZEROS) || ends_a_solid(&tail))
-}
-
-/// Is the last line of text one that begins with `endsolid`, in any case?
-fn ends_a_solid(tail: &[u8]) -> bool {
-    let text = tail.trim_ascii_end();
-    let line = text.rsplit(|&b| b == b'\n' || b == b'\r').next().unwrap_or_default().trim_ascii_start();
-    line.get(..8).is_some_and(|word| word.eq_ignore_ascii_case(b"endsolid"))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -193,28 +159,5 @@ mod tests {
             assert_eq!(file.look(identity(1), start + Duration::from_secs(s), REST), Look::IfLengthFits);
         }
         assert_eq!(file.look(identity(1), start + Duration::from_secs(18), REST), Look::Ready);
-    }
-
-    #[test]
-    fn f21_lengths_of_complete_files() {
-        let dir = tempfile::tempdir().unwrap();
-        let path = dir.path().join("a");
-        let fits = |bytes: &[u8]| {
-            std::fs::write(&path, bytes).unwrap();
-            length_fits(&File::open(&path).unwrap()).unwrap()
-        };
-        let mut binary = vec![0; 84 + 100];
-        binary[80] = 2;
-        assert!(fits(&binary));
-        assert!(!fits(&binary[..183]), "cut short");
-        assert!(!fits(&[&binary[..], b"x"].concat()), "still growing, or with a tail");
-        let mut half = vec![7; 84 + 50 * 20];
-        half[80..84].copy_from_slice(&20_u32.to_le_bytes());
-        assert!(fits(&half));
-        half[84 + 50 * 10..].fill(0);
-        assert!(!fits(&half), "D6: its size was set before it was written");
-        assert!(fits(b"solid a\nfacet\nENDSOLID a\r\n"));
-        assert!(!fits(b"solid a\nfacet normal 0 0 1"));
-        assert!(!fits(b""));
     }
 }

@@ -48,8 +48,8 @@ pub(super) struct Maker<'a> {
     expected: Vec<Expected>,
     /// The triangles of each volume of the slicer's, as they are now.
     volumes: Vec<Range<u64>>,
-    /// An object's triangles are others than before.
-    is_changed: bool,
+    /// Objects whose sets of triangles are left out.
+    objects_without_sets: u64,
 }
 
 /// What a package becomes.
@@ -58,6 +58,8 @@ pub(super) struct Changed {
     content: BTreeMap<usize, Mmap>,
     config: Option<(usize, Vec<u8>)>,
     pub(super) account: Account,
+    /// Objects whose sets of triangles are left out.
+    pub(super) objects_without_sets: u64,
     pub(super) expected: Vec<Expected>,
 }
 
@@ -74,7 +76,7 @@ impl<'a> Maker<'a> {
     pub(super) fn new(package: &'a PackageFile, work: Work<'a>) -> Self {
         let volumes = package.volumes().iter().map(|volume| volume.triangles.clone()).collect();
         let (texts, expected) = (BTreeMap::new(), Vec::new());
-        Self { package, work, texts, account: Account::default(), expected, volumes, is_changed: false }
+        Self { package, work, texts, account: Account::default(), expected, volumes, objects_without_sets: 0 }
     }
 
     /// Repairs the meshes of an object, and writes what came of them into the text of its part.
@@ -143,8 +145,14 @@ impl<'a> Maker<'a> {
         };
         let written = model::write(text, units, new.at, &mut sink)?;
         new.at = written.at;
+        // Sets refer to triangles by their numbers, which are others now.
+        if let Some(sets) = self.package.sets_at(place) {
+            let before = text.text.get(new.at..sets.start).unwrap_or_default();
+            before.chunks(1 << 20).try_for_each(&mut sink)?;
+            new.at = sets.end;
+            self.objects_without_sets += 1;
+        }
         self.account.add(written.account);
-        self.is_changed = true;
         let mut at = 0;
         for (volume, triangles) in self.package.volumes_at(place).into_iter().zip(&written.triangles) {
             if let Some(range) = self.volumes.get_mut(volume) {
@@ -177,7 +185,8 @@ impl<'a> Maker<'a> {
         let is_renumbered = self.package.volumes().iter().map(|volume| &volume.triangles).ne(&self.volumes);
         let config = self.package.config().filter(|_| is_renumbered);
         let config = config.map(|(entry, text)| (entry, slicer::renumbered(text, self.package.volumes(), &self.volumes)));
-        Ok(Changed { content, config, account: self.account, expected: self.expected })
+        let objects_without_sets = self.objects_without_sets;
+        Ok(Changed { content, config, account: self.account, objects_without_sets, expected: self.expected })
     }
 }
 

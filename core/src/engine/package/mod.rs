@@ -26,6 +26,7 @@ use crate::io::disk_space::{self, Need};
 use crate::io::read::PackageFile;
 use crate::output::emit;
 use crate::output::model::Account;
+use crate::util::words::{self, Counted};
 use change::{Changed, Maker};
 use units::Nameless;
 
@@ -136,8 +137,22 @@ fn judge(package: &PackageFile, changed: &Changed, report: &mut Report, profile:
     if package.is_signed() {
         concerns.push("the package is signed, and no signature holds of a package that was changed".to_owned());
     }
-    let harmed = changed.account.lost + changed.account.approximated;
-    let words = || format!("colours, paint or other attributes of {harmed} triangles are lost or only about right");
+    let triangles = changed.account.lost + changed.account.approximated;
+    let harmed = triangles + changed.objects_without_sets;
+    let sets = Counted(changed.objects_without_sets, "object", "objects");
+    let words = || match changed.objects_without_sets {
+        0 => format!("colours, paint or other attributes of {} are lost or only about right", words::triangles(triangles)),
+        _ => format!(
+            "attributes of {} are lost or only about right, and sets of triangles of {sets} are left out",
+            words::triangles(triangles)
+        ),
+    };
+    if changed.objects_without_sets > 0 {
+        report
+            .input
+            .findings
+            .push(format!("sets of triangles of {sets} are left out: they name triangles by numbers, which are others now"));
+    }
     match profile.attributes {
         KeepAttributes::Refuse if harmed > 0 => {
             report.outcome = Outcome::NotGood;

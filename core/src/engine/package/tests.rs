@@ -186,3 +186,17 @@ fn a_profile_may_refuse_to_lose_attributes() {
     assert_eq!(outcome(KeepAttributes::Keep), (Outcome::NeedsReview, true));
     assert_eq!(outcome(KeepAttributes::Refuse), (Outcome::NotGood, false));
 }
+
+#[test]
+fn sets_of_triangles_are_left_out_where_numbers_change() {
+    let sets = "<t:trianglesets xmlns:t=\"http://schemas.microsoft.com/3dmanufacturing/trianglesets/2021/07\"><t:triangleset name=\"a\" \
+        identifier=\"a\"><t:ref index=\"3\"/></t:triangleset></t:trianglesets>";
+    let with = |id, of: &[[usize; 3]]| {
+        object(id, &vertices(), &triangles(of, |_| String::new())).replace("</mesh>", &format!("{sets}</mesh>"))
+    };
+    let repaired = Repaired::of(&package(&[with(1, &BOX[..11]), with(2, &BOX)], &[]), &Profile::default());
+    let text = repaired.text();
+    assert_eq!((repaired.report.outcome, text.matches("<t:trianglesets").count()), (Outcome::Repaired, 1), "{text}");
+    assert!(text.contains(&with(2, &BOX)), "{text}");
+    assert!(repaired.report.input.findings.iter().any(|finding| finding.contains("sets of triangles of 1 object are left out")));
+}

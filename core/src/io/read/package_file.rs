@@ -101,6 +101,19 @@ impl PackageFile {
         }
     }
 
+    /// Where the sets of an object's triangles stand in the text of its part, if it has any (3MF Triangle Sets Extension 1.0).
+    pub(crate) fn sets_at(&self, place: Place) -> Option<Range<usize>> {
+        const NAME: &[u8] = b"trianglesets";
+        let Content::Mesh(mesh) = &self.model.object(place)?.content else { return None };
+        let behind = mesh.triangles.whole.end;
+        let text = self.text(place.part).get(behind..mesh.whole.end)?;
+        let first = memchr::memmem::find(text, NAME)?;
+        let from = memchr::memrchr(b'<', text.get(..first)?)?;
+        let last = memchr::memmem::rfind(text, NAME)?;
+        let to = last + memchr::memchr(b'>', text.get(last..)?)? + 1;
+        Some(behind + from..behind + to)
+    }
+
     /// The text of a part.
     pub(crate) fn text(&self, part: usize) -> &[u8] {
         self.model.parts.get(part).map_or(&[], |part| part.text())

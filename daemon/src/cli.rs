@@ -181,7 +181,7 @@ impl Spend {
 
 #[derive(Args, Debug)]
 pub(crate) struct RepairArgs {
-    /// Mesh files: STL, PLY, OFF, OBJ, AMF
+    /// Mesh files: STL, 3MF, PLY, OFF, OBJ, AMF
     #[arg(required = true, value_name = "IN")]
     pub inputs: Vec<PathBuf>,
     /// Where to write: a file name, or a folder (needed for several inputs; part.stl, then part~2.stl)
@@ -217,7 +217,7 @@ pub(crate) struct RepairArgs {
 
 #[derive(Args, Debug)]
 pub(crate) struct InspectArgs {
-    /// Mesh files: STL, PLY, OFF, OBJ, AMF
+    /// Mesh files: STL, 3MF, PLY, OFF, OBJ, AMF
     #[arg(required = true, value_name = "IN")]
     pub inputs: Vec<PathBuf>,
     /// Profile: default, fast, strict, cautious, scan, inspect-only, or a TOML file of settings
@@ -241,7 +241,7 @@ pub(crate) struct InspectArgs {
 
 #[derive(Args, Debug)]
 pub(crate) struct ConvertArgs {
-    /// A mesh file: STL, PLY, OFF, OBJ, AMF
+    /// A mesh file: STL, 3MF, PLY, OFF, OBJ, AMF
     #[arg(value_name = "IN")]
     pub input: PathBuf,
     /// The file to write; its ending says the format
@@ -294,9 +294,11 @@ pub(crate) struct PictureArgs {
     pub spend: Spend,
 }
 
+/// Formats of results that can be asked for, by their endings. A 3MF is written for a 3MF only.
+pub(crate) const WRITTEN: &str = "stl, ply, off, obj, amf";
+
 fn parse_format(text: &str) -> Result<OutputFormat, String> {
-    let names = || suture_core::read::ENDINGS.join(", ");
-    OutputFormat::of_ending(text).ok_or_else(|| format!("one of {}", names()))
+    OutputFormat::of_ending(text).ok_or_else(|| format!("one of {WRITTEN}"))
 }
 
 fn parse_pixels(text: &str) -> Result<(usize, usize), String> {

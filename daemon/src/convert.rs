@@ -5,7 +5,7 @@ use std::path::Path;
 use suture_core::report::{Converted, FileFacts};
 use suture_core::{OutputFormat, Quiet, words};
 
-use crate::cli::ConvertArgs;
+use crate::cli::{ConvertArgs, WRITTEN};
 use crate::draft::Draft;
 use crate::exit::Exit;
 use crate::fsx;
@@ -38,7 +38,7 @@ fn convert(args: &ConvertArgs) -> Result<Converted, String> {
     let shown = output.display();
     let ending = output.extension().and_then(|ending| OutputFormat::of_ending(ending.to_str()?));
     let format = ending.ok_or_else(|| {
-        format!("{shown}: its ending says no format that is written; one of {}", suture_core::read::ENDINGS.join(", "))
+        format!("{shown}: its ending says no format that meshes are converted to; one of {WRITTEN}")
     })?;
     naming::check_one(std::slice::from_ref(input), output, args.force)?;
     let failed = |error: std::io::Error| format!("{shown}: cannot be written: {error}");

@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 use imports::Imports;
 
 /// The folders of the engine, each of which may import those before it, and only those.
-const ROOMS: [&str; 13] = [
+const ROOMS: [&str; 14] = [
     "util",
     "contract",
     "attributes",

@@ -10,7 +10,7 @@ use suture_core::OutputFormat;
 use suture_store::Priority;
 use suture_store::job::Kind;
 
-use crate::units::{parse_duration, parse_listen, parse_size};
+use crate::units::{parse_duration, parse_format, parse_listen, parse_size};
 use service::{CompletionsArgs, ManArgs, NightArgs, StatusArgs, StoreArgs, TopArgs};
 
 pub(crate) mod service;
@@ -292,13 +292,6 @@ pub(crate) struct PictureArgs {
     pub eye: Option<(f64, f64)>,
     #[command(flatten)]
     pub spend: Spend,
-}
-
-/// Formats of results that can be asked for, by their endings. A 3MF is written for a 3MF only.
-pub(crate) const WRITTEN: &str = "stl, ply, off, obj, amf";
-
-fn parse_format(text: &str) -> Result<OutputFormat, String> {
-    OutputFormat::of_ending(text).ok_or_else(|| format!("one of {WRITTEN}"))
 }
 
 fn parse_pixels(text: &str) -> Result<(usize, usize), String> {

@@ -10,7 +10,7 @@ use suture_core::OutputFormat;
 use suture_store::Priority;
 use suture_store::job::Kind;
 
-use crate::units::{parse_duration, parse_listen, parse_size};
+use crate::units::{parse_duration, parse_format, parse_listen, parse_size};
 use service::{CompletionsArgs, ManArgs, NightArgs, StatusArgs, StoreArgs, TopArgs};
 
 pub(crate) mod service;
@@ -181,7 +181,7 @@ impl Spend {
 
 #[derive(Args, Debug)]
 pub(crate) struct RepairArgs {
-    /// Mesh files: STL, PLY, OFF, OBJ, AMF
+    /// Mesh files: STL, 3MF, PLY, OFF, OBJ, AMF
     #[arg(required = true, value_name = "IN")]
     pub inputs: Vec<PathBuf>,
     /// Where to write: a file name, or a folder (needed for several inputs; part.stl, then part~2.stl)
@@ -217,7 +217,7 @@ pub(crate) struct RepairArgs {
 
 #[derive(Args, Debug)]
 pub(crate) struct InspectArgs {
-    /// Mesh files: STL, PLY, OFF, OBJ, AMF
+    /// Mesh files: STL, 3MF, PLY, OFF, OBJ, AMF
     #[arg(required = true, value_name = "IN")]
     pub inputs: Vec<PathBuf>,
     /// Profile: default, fast, strict, cautious, scan, inspect-only, or a TOML file of settings
@@ -241,7 +241,7 @@ pub(crate) struct InspectArgs {
 
 #[derive(Args, Debug)]
 pub(crate) struct ConvertArgs {
-    /// A mesh file: STL, PLY, OFF, OBJ, AMF
+    /// A mesh file: STL, 3MF, PLY, OFF, OBJ, AMF
     #[arg(value_name = "IN")]
     pub input: PathBuf,
     /// The file to write; its ending says the format
@@ -292,11 +292,6 @@ pub(crate) struct PictureArgs {
     pub eye: Option<(f64, f64)>,
     #[command(flatten)]
     pub spend: Spend,
-}
-
-fn parse_format(text: &str) -> Result<OutputFormat, String> {
-    let names = || suture_core::read::ENDINGS.join(", ");
-    OutputFormat::of_ending(text).ok_or_else(|| format!("one of {}", names()))
 }
 
 fn parse_pixels(text: &str) -> Result<(usize, usize), String> {

@@ -13,7 +13,7 @@ use crate::naming;
 use crate::rights::Rights;
 use crate::say::{complain, plain, print};
 use crate::table::format_name;
-use crate::units::show_size;
+use crate::units::{WRITTEN, show_size};
 
 /// Writes what the command line asks for.
 pub(crate) fn run(args: &ConvertArgs) -> Exit {
@@ -37,9 +37,8 @@ fn convert(args: &ConvertArgs) -> Result<Converted, String> {
     let (input, output) = (&args.input, &args.output);
     let shown = output.display();
     let ending = output.extension().and_then(|ending| OutputFormat::of_ending(ending.to_str()?));
-    let format = ending.ok_or_else(|| {
-        format!("{shown}: its ending says no format that is written; one of {}", suture_core::read::ENDINGS.join(", "))
-    })?;
+    let format =
+        ending.ok_or_else(|| format!("{shown}: its ending says no format that meshes are converted to; one of {WRITTEN}"))?;
     naming::check_one(std::slice::from_ref(input), output, args.force)?;
     let failed = |error: std::io::Error| format!("{shown}: cannot be written: {error}");
     let draft = Draft::new(fsx::folder_of(output)).map_err(failed)?;

@@ -63,7 +63,7 @@ fn farewell(dir: &Path, id: u64) {
         (format!("suture jobs list --dir {shown}"), "what became of every file"),
         (format!("suture jobs show {id} --dir {shown}"), "one of them in full"),
         ("suture repair YOUR.stl -o repaired.stl".into(), "one file"),
-        (format!("suture watch {shown}"), "serve the folder; drop STL files into its in/, end with Ctrl-C"),
+        (format!("suture watch {shown}"), "serve the folder; drop meshes into its in/, end with Ctrl-C"),
     ];
     let width = lines.iter().map(|(what, _)| what.chars().count()).max().unwrap_or(0);
     say(format_args!("\nWhere things are"));

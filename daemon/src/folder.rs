@@ -320,12 +320,12 @@ pub(crate) fn endings() -> String {
 pub(crate) fn name_kind(name: &OsStr) -> NameKind {
     let lossy = name.to_string_lossy();
     let lower = lossy.to_ascii_lowercase();
-    const ENDINGS: [&str; 9] = [".part", ".tmp", ".temp", ".crdownload", ".partial", ".filepart", ".download", ".swp", "~"];
+    const TEMPORARY: [&str; 9] = [".part", ".tmp", ".temp", ".crdownload", ".partial", ".filepart", ".download", ".swp", "~"];
     const LITTER: [&str; 4] = ["thumbs.db", "desktop.ini", "@eadir", "lost+found"];
     let hidden = lower.starts_with('.') || lower.starts_with("~$") || lower.starts_with('#');
     // What this program puts beside results, and someone copies back with them.
     let ours = lower.ends_with(REPORT) || lower.ends_with(RECEIPT);
-    if hidden || ours || ENDINGS.iter().any(|ending| lower.ends_with(ending)) || LITTER.contains(&lower.as_str()) {
+    if hidden || ours || TEMPORARY.iter().any(|ending| lower.ends_with(ending)) || LITTER.contains(&lower.as_str()) {
         return NameKind::Ignored;
     }
     let is_mesh = lower.rsplit_once('.').is_some_and(|(_, ending)| ENDINGS.contains(&ending));

@@ -56,9 +56,11 @@ impl Given {
 }
 
 impl Naming {
+    /// `format`: that of the results.
+    ///
     /// # Errors
     /// A line for people when the command line asks for what cannot be.
-    pub(crate) fn new(args: &RepairArgs) -> Result<Self, String> {
+    pub(crate) fn new(args: &RepairArgs, format: OutputFormat) -> Result<Self, String> {
         let (output, several) = (args.output.clone(), args.inputs.len() > 1);
         let folder = is_folder(&output)?;
         let shown = output.display();
@@ -76,7 +78,7 @@ impl Naming {
         }
         let inputs = ids_of(&args.inputs, args.force)?;
         let (report, force) = (args.report.clone(), args.force);
-        let ending = args.format.and_then(OutputFormat::ending);
+        let ending = format.ending();
         let naming = Self { output, ending, folder, report, several, inputs, force, given: Mutex::default() };
         if !folder {
             naming.check(&naming.output)?;
@@ -251,7 +253,7 @@ mod tests {
 
     fn naming(line: &[&str]) -> Result<Naming, String> {
         match Cli::try_parse_from([&["suture", "repair"], line].concat()).unwrap().command {
-            Command::Repair(args) => Naming::new(&args),
+            Command::Repair(args) => Naming::new(&args, OutputFormat::Input),
             _ => unreachable!("the line begins with `repair`"),
         }
     }

@@ -23,7 +23,7 @@ pub(crate) fn repair(args: &RepairArgs) -> Exit {
         let of_name = || args.output.extension().and_then(|ending| OutputFormat::of_ending(ending.to_str()?));
         let is_folder = fsx::is_folder(&args.output).unwrap_or(false);
         profile.format = args.format.or_else(|| of_name().filter(|_| !is_folder)).unwrap_or(profile.format);
-        let naming = Some(Naming::new(args)?);
+        let naming = Some(Naming::new(args, profile.format)?);
         let limits = args.spend.limits(args.list_edit);
         Ok(Order { inputs: &args.inputs, profile, limits, naming, certificate: None, json: args.json })
     });

@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use jiff::Timestamp;
 use jiff::tz::TimeZone;
+use suture_core::OutputFormat;
 use suture_core::words::{At, Count, Short};
 
 /// Splits `text` into its number and its unit.
@@ -139,6 +140,17 @@ pub(crate) fn show_when(ms: u64) -> String {
 /// A line for people.
 pub(crate) fn parse_listen(text: &str) -> Result<SocketAddr, String> {
     text.parse().map_err(|_| format!("`{text}` is no address with a port (try 127.0.0.1:7878)"))
+}
+
+/// Formats of results that can be asked for, by their endings. A 3MF is written for a 3MF only.
+pub(crate) const WRITTEN: &str = "stl, ply, off, obj, amf";
+
+/// The format whose names have this ending.
+///
+/// # Errors
+/// A line that lists those that there are.
+pub(crate) fn parse_format(text: &str) -> Result<OutputFormat, String> {
+    OutputFormat::of_ending(text).ok_or_else(|| format!("one of {WRITTEN}"))
 }
 
 #[cfg(test)]

@@ -24,7 +24,7 @@ def inspect_file(
     threads: int | None = None,
     progress: Progress | None = None,
 ) -> dict[str, Any]:
-    """Diagnoses a binary or text STL of any size and writes nothing. Returns the report.
+    """Diagnoses a mesh file (STL, 3MF, PLY, OFF, OBJ, AMF) of any size and writes nothing. Returns the report.
 
     ``memory`` bounds what the system cannot take back, 1 GiB if not given; the file may be far larger.
     """
@@ -44,7 +44,10 @@ def repair_file(
     replace: bool = False,
     progress: Progress | None = None,
 ) -> dict[str, Any]:
-    """Repairs a binary or text STL of any size into a new file, and returns the report.
+    """Repairs a mesh file (STL, 3MF, PLY, OFF, OBJ, AMF) of any size into a new file, and returns the report.
+
+    The output has the format of the input, whatever its name ends in; ``profile={"format": "stl"}`` (``"ply"``, ``"off"``, ``"obj"``, ``"amf"``)
+    chooses another one. Of a repaired PLY, OFF, OBJ or AMF, positions and triangles are written, nothing else.
 
     The output appears under its name when it is complete and on the disk, whatever the outcome: look at ``report["outcome"]``. It has the same
     bytes whatever ``memory`` and ``threads`` are. The input is never written to. If there is a file of that name already, it is replaced only

@@ -6,6 +6,7 @@
 pub mod binary;
 pub mod disk;
 pub mod edit;
+pub mod forms;
 pub mod hot;
 pub mod http;
 pub mod openapi;
@@ -17,5 +18,6 @@ pub mod served;
 pub mod stl;
 #[cfg(all(target_os = "linux", target_arch = "x86_64"))]
 pub mod trace;
+pub mod zip;
 
 pub use place::{Place, Ran};

@@ -9,6 +9,7 @@ mod e2e {
     mod cases;
     mod config;
     mod files;
+    mod formats;
     mod heard;
     mod hostile;
     mod interrupted;

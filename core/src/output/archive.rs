@@ -29,6 +29,9 @@ const WIDE: u64 = 0xffff_ffff;
 /// A content of this length may be longer than 32 bits count when it is packed.
 const MAYBE_WIDE: usize = 0xf000_0000;
 const WIDE_FIELD: u16 = 1;
+/// Versions of the format (APPNOTE 4.4.3.2).
+const NEEDED_FOR_DEFLATE: u16 = 20;
+const NEEDED_FOR_WIDE: u16 = 45;
 /// Flag: names and comments are UTF-8.
 const UTF8: u16 = 1 << 11;
 const DEFLATED: u16 = 8;
@@ -36,6 +39,8 @@ const DEFLATED: u16 = 8;
 /// Where an entry stands in the new archive, and how large it is.
 struct Placed {
     at: u64,
+    /// The version of the format that is needed to read it, the same in both headers.
+    version: u16,
     flags: u16,
     method: u16,
     crc: u32,
@@ -73,7 +78,10 @@ pub(crate) fn write<'c>(
     for number in order {
         let Some(entry) = archive.entries.get(number) else { continue };
         let there = match replaced(number) {
-            Some(content) => parallel::in_pool(limits.threads, || writer.pack(entry, content))?,
+            Some(content) => {
+                let listed = archive.bytes.get(entry.listed.clone()).unwrap_or_default();
+                parallel::in_pool(limits.threads, || writer.pack((entry, listed), content))?
+            }
             None => writer.keep(archive, entry)?,
         };
         placed.push((number, there));
@@ -97,15 +105,25 @@ impl Writer<'_> {
             self.append(part)?;
         }
         let method = entry.method.number();
-        Ok(Placed { at, flags: entry.flags, method, crc: entry.crc, packed: entry.packed, plain: entry.plain })
+        let listed = archive.bytes.get(entry.listed.clone()).unwrap_or_default();
+        Ok(Placed {
+            at,
+            version: short(listed, 6),
+            flags: entry.flags,
+            method,
+            crc: entry.crc,
+            packed: entry.packed,
+            plain: entry.plain,
+        })
     }
 
     /// Packs a content; its header is written once its sizes are known.
-    fn pack(&mut self, entry: &Entry, content: &[u8]) -> Result<Placed> {
+    fn pack(&mut self, (entry, listed): (&Entry, &[u8]), content: &[u8]) -> Result<Placed> {
         let at = self.at;
         let is_wide = content.len() >= MAYBE_WIDE;
         let plain = content.len() as u64;
-        let mut there = Placed { at, flags: entry.flags & UTF8, method: DEFLATED, crc: 0, packed: 0, plain };
+        let version = short(listed, 6).max(if is_wide { NEEDED_FOR_WIDE } else { NEEDED_FOR_DEFLATE });
+        let mut there = Placed { at, version, flags: entry.flags & UTF8, method: DEFLATED, crc: 0, packed: 0, plain };
         self.append(&local_header(entry, &there, is_wide))?;
         let mut hasher = crc32fast::Hasher::new();
         let begin = self.at;
@@ -152,13 +170,18 @@ impl Writer<'_> {
             record.extend(1u32.to_le_bytes());
             self.append(&record)?;
         }
-        let short = |value: u64| u16::try_from(value).unwrap_or(u16::MAX);
+        let count_of = |value: u64| u16::try_from(value).unwrap_or(u16::MAX);
         let mut record = b"PK\x05\x06\0\0\0\0".to_vec();
-        record.extend([short(count), short(count)].map(u16::to_le_bytes).as_flattened());
+        record.extend([count_of(count), count_of(count)].map(u16::to_le_bytes).as_flattened());
         record.extend([narrow(size), narrow(begin)].map(u32::to_le_bytes).as_flattened());
         record.extend([0, 0]);
         self.append(&record)
     }
+}
+
+/// A field of a header.
+fn short(header: &[u8], at: usize) -> u16 {
+    header.get(at..).and_then(|bytes| bytes.first_chunk()).copied().map_or(0, u16::from_le_bytes)
 }
 
 /// The value, or the sign that it stands in the extra field.
@@ -188,8 +211,7 @@ fn deflate(block: &[u8], is_last: bool) -> Option<Vec<u8>> {
 
 fn local_header(entry: &Entry, there: &Placed, is_wide: bool) -> Vec<u8> {
     let mut header = b"PK\x03\x04".to_vec();
-    let version: u16 = if is_wide { 45 } else { 20 };
-    header.extend([version, there.flags, there.method].map(u16::to_le_bytes).as_flattened());
+    header.extend([there.version, there.flags, there.method].map(u16::to_le_bytes).as_flattened());
     header.extend(entry.time.to_le_bytes());
     header.extend(there.crc.to_le_bytes());
     let sizes = if is_wide { [u32::MAX; 2] } else { [narrow(there.packed), narrow(there.plain)] };
@@ -206,8 +228,7 @@ fn local_header(entry: &Entry, there: &Placed, is_wide: bool) -> Vec<u8> {
 
 /// The header in the central directory: the old one's fields, with what is of the new place and size. `listed`: the old one.
 fn central_header(listed: &[u8], entry: &Entry, there: &Placed) -> Vec<u8> {
-    let short = |at: usize| listed.get(at..).and_then(|bytes| bytes.first_chunk()).copied().map_or(0, u16::from_le_bytes);
-    let [name, extra, comment] = [28, 30, 32].map(|at| usize::from(short(at)));
+    let [name, extra, comment] = [28, 30, 32].map(|at| usize::from(short(listed, at)));
     let old = listed.get(46 + name..46 + name + extra).unwrap_or_default();
     let comment = listed.get(46 + name + extra..46 + name + extra + comment).unwrap_or_default();
     let mut fields = without_wide(old);
@@ -216,9 +237,9 @@ fn central_header(listed: &[u8], entry: &Entry, there: &Placed) -> Vec<u8> {
         fields.extend([WIDE_FIELD, 8 * wide.len() as u16].map(u16::to_le_bytes).as_flattened());
         wide.iter().for_each(|value| fields.extend(value.to_le_bytes()));
     }
-    let version = if wide.is_empty() { short(6) } else { 45 };
+    let version = there.version.max(if wide.is_empty() { 0 } else { NEEDED_FOR_WIDE });
     let mut header = b"PK\x01\x02".to_vec();
-    header.extend([short(4), version, there.flags, there.method].map(u16::to_le_bytes).as_flattened());
+    header.extend([short(listed, 4), version, there.flags, there.method].map(u16::to_le_bytes).as_flattened());
     header.extend(entry.time.to_le_bytes());
     header.extend([there.crc, narrow(there.packed), narrow(there.plain)].map(u32::to_le_bytes).as_flattened());
     header.extend([entry.raw_name.len(), fields.len(), comment.len()].map(|length| (length as u16).to_le_bytes()).as_flattened());

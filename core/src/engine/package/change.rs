@@ -220,8 +220,8 @@ fn records_of<'r>(unit: &UnitOf, read: &'r MeshRecords) -> &'r [Record] {
 }
 
 fn mesh_text<'t>(package: &'t PackageFile, place: Place, read: &'t MeshRecords) -> MeshText<'t> {
-    let (text, vertices_end, triangles) = package.mesh_at(place);
-    MeshText { text, vertices_end, triangles, vertices: read.vertices() }
+    let (text, vertices_within, triangles) = package.mesh_at(place);
+    MeshText { text, vertices_within, triangles, vertices: read.vertices() }
 }
 
 fn what_became<'u>(unit: &UnitOf, mended: Option<&'u Mended>) -> Unit<'u> {

@@ -4,6 +4,7 @@ use crate::contract::report::{Outcome, Report};
 use crate::contract::settings::{KeepAttributes, Limits, Profile};
 use crate::io::read::archive_build::{Member, member, zip};
 use crate::io::read::{Archive, PackageFile};
+use crate::output::model::Elements;
 use crate::{Quiet, repair};
 
 const CORE: &str = "http://schemas.microsoft.com/3dmanufacturing/core/2015/02";
@@ -199,4 +200,32 @@ fn sets_of_triangles_are_left_out_where_numbers_change() {
     assert_eq!((repaired.report.outcome, text.matches("<t:trianglesets").count()), (Outcome::Repaired, 1), "{text}");
     assert!(text.contains(&with(2, &BOX)), "{text}");
     assert!(repaired.report.input.findings.iter().any(|finding| finding.contains("sets of triangles of 1 object are left out")));
+}
+
+/// PrusaSlicer takes all vertices between the first and the last of a volume for the volume's own.
+#[test]
+fn new_vertices_of_a_volume_stand_before_those_of_the_next() {
+    let shifted = |by: u32| -> String {
+        (0..8).map(corner).map(|[x, y, z]| format!("<vertex x=\"{}\" y=\"{}\" z=\"{}\"/>\n", x + by, y + by, z + by)).collect()
+    };
+    let all: Vec<[usize; 3]> = [0, 8, 16].iter().flat_map(|from| BOX.map(|triangle| triangle.map(|k| k + from))).collect();
+    let config = "<config><object id=\"1\"><volume firstid=\"0\" lastid=\"23\"/><volume firstid=\"24\" lastid=\"35\">\
+        <metadata type=\"volume\" key=\"volume_type\" value=\"ParameterModifier\"/></volume></object></config>";
+    let vertices = [shifted(0), shifted(5), shifted(100)].concat();
+    let coloured = |k: usize| if k < 24 { mmu("4") } else { String::new() };
+    let input =
+        package(&[object(1, &vertices, &triangles(&all, coloured))], &[member("Metadata/Slic3r_PE_model.config", config)]);
+    let repaired = Repaired::of(&input, &Profile::default());
+    assert_eq!(repaired.report.outcome, Outcome::Repaired, "{:?}", repaired.report.verdict);
+    let limits = Limits { spool: Some(repaired.folder.path().into()), ..Limits::default() };
+    let package = PackageFile::open(&repaired.folder.path().join("out.3mf"), &limits, &Quiet).unwrap().unwrap();
+    let place = package.meshes()[0];
+    let (text, _, within) = package.mesh_at(place);
+    let corners: Vec<_> = Elements::within(text, within).map(|element| (element.vertices, element.attributes.len())).collect();
+    let first = package.volumes()[0].triangles.end as usize;
+    let own = corners[..first].iter().flat_map(|(vertices, _)| vertices).max().unwrap();
+    let next = corners[first..].iter().flat_map(|(vertices, _)| vertices).min().unwrap();
+    assert!(*own > 15 && own < next, "{own} {next}");
+    assert_eq!(corners.len() - first, 12);
+    assert!(corners[..first].iter().all(|(_, attributes)| *attributes == 1), "each part of a coloured triangle is coloured");
 }

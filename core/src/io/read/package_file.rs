@@ -93,11 +93,11 @@ impl PackageFile {
         (object.map_or(0, |object| object.id), object.map(|object| object.name.clone()).unwrap_or_default(), part)
     }
 
-    /// The text of a part, where the tag that ends the vertices of an object's mesh begins in it, and what stands between the tags of its triangles.
-    pub(crate) fn mesh_at(&self, place: Place) -> (&[u8], usize, Range<usize>) {
+    /// The text of a part, and what stands in it between the tags of the vertices and of the triangles of an object's mesh.
+    pub(crate) fn mesh_at(&self, place: Place) -> (&[u8], Range<usize>, Range<usize>) {
         match self.model.object(place).map(|object| &object.content) {
-            Some(Content::Mesh(mesh)) => (self.text(place.part), mesh.vertices.inner.end, mesh.triangles.inner.clone()),
-            _ => (&[], 0, 0..0),
+            Some(Content::Mesh(mesh)) => (self.text(place.part), mesh.vertices.inner.clone(), mesh.triangles.inner.clone()),
+            _ => (&[], 0..0, 0..0),
         }
     }
 

@@ -114,6 +114,13 @@ impl<'t> Iterator for Elements<'t> {
     type Item = Element<'t>;
 
     fn next(&mut self) -> Option<Element<'t>> {
+        self.next_called(b"triangle")
+    }
+}
+
+impl<'t> Elements<'t> {
+    /// The next element of this name, whatever its prefix.
+    pub(crate) fn next_called(&mut self, name: &[u8]) -> Option<Element<'t>> {
         loop {
             let length = self.rest().iter().position(|byte| *byte == b'<')?;
             self.at += length;
@@ -129,7 +136,7 @@ impl<'t> Iterator for Elements<'t> {
                 }
                 _ => {
                     let (mut element, is_closed) = self.tag()?;
-                    if local(element.name) != b"triangle" {
+                    if local(element.name) != name {
                         continue;
                     }
                     if !is_closed && self.skip_past(b"</") && self.skip_past(b">") {

@@ -5,8 +5,16 @@ use crate::attributes::paint::Paint;
 use crate::io::record::Point;
 
 /// Attributes whose values are paint: PrusaSlicer's, then those of OrcaSlicer and Bambu Studio.
-const PAINTS: [&[u8]; 7] =
-    [b"custom_supports", b"custom_seam", b"mmu_segmentation", b"fuzzy_skin", b"paint_supports", b"paint_seam", b"paint_color"];
+const PAINTS: [&[u8]; 8] = [
+    b"custom_supports",
+    b"custom_seam",
+    b"mmu_segmentation",
+    b"fuzzy_skin",
+    b"paint_supports",
+    b"paint_seam",
+    b"paint_color",
+    b"paint_fuzzy_skin",
+];
 
 /// An attribute by its name with prefix, and its value as it stands in the text.
 pub(crate) type Attribute = (Vec<u8>, Vec<u8>);

@@ -17,7 +17,8 @@ use std::io::Write;
 
 use crate::contract::error::Result;
 use crate::io::record;
-use elements::{Element, Elements};
+use elements::Element;
+pub(crate) use elements::Elements;
 use inherit::Attribute;
 pub(crate) use plan::{Change, MeshText, Unit};
 use plan::{Fate, Plan, UnitPlan};
@@ -139,28 +140,39 @@ impl Writer<'_, '_> {
     }
 
     fn vertices(&mut self) {
-        self.copy_to(self.mesh.vertices_end);
+        let within = self.mesh.vertices_within.clone();
         // `</`, and the prefix that the elements around have.
-        let tag = self.mesh.text.get(self.mesh.vertices_end + 2..).unwrap_or_default();
+        let tag = self.mesh.text.get(within.end + 2..).unwrap_or_default();
         let name = tag.get(..tag.iter().position(|byte| !is_of_name(*byte)).unwrap_or(0)).unwrap_or_default();
         let prefix = name.strip_suffix(b"vertices").unwrap_or_default();
-        let mut text = Vec::new();
-        for [x, y, z] in &self.plan.fresh {
-            text.extend_from_slice(b"<");
-            text.extend_from_slice(prefix);
-            // Writing to a vector cannot fail.
-            let _ = writeln!(text, "vertex x=\"{x}\" y=\"{y}\" z=\"{z}\"/>");
+        let (mut elements, mut number) = (Elements::within(self.mesh.text, within.clone()), 0);
+        for insert in &self.plan.inserts {
+            let last = self.mesh.vertices.len() as u32;
+            let mut to = within.end;
+            // The end of the vertex before.
+            while insert.at < last && number < insert.at {
+                let Some(vertex) = elements.next_called(b"vertex") else { break };
+                (number, to) = (number + 1, vertex.whole.end);
+            }
+            self.copy_to(to);
+            let range = insert.fresh.start as usize..insert.fresh.end as usize;
+            let mut text = Vec::new();
+            for [x, y, z] in self.plan.fresh.get(range).unwrap_or_default() {
+                text.extend_from_slice(b"<");
+                text.extend_from_slice(prefix);
+                // Writing to a vector cannot fail.
+                let _ = writeln!(text, "vertex x=\"{x}\" y=\"{y}\" z=\"{z}\"/>");
+            }
+            self.put(&text);
         }
-        self.put(&text);
         self.copy_to(self.mesh.triangles.start);
     }
 
     /// Leaves so many triangles as they are.
     fn keep(&mut self, triangles: usize, elements: &mut Elements<'_>) {
         for element in elements.by_ref().take(triangles) {
-            self.seen = element.whole.end;
             self.account.kept += u64::from(!element.attributes.is_empty());
-            self.count += 1;
+            self.stay(&element, element.vertices);
         }
     }
 
@@ -218,12 +230,16 @@ impl Writer<'_, '_> {
     fn next_kept(&mut self, elements: &mut Elements<'_>) {
         let Some(element) = elements.next() else { return };
         self.account.kept += u64::from(!element.attributes.is_empty());
-        let canonical = self.plan.canonical(element.vertices);
-        if canonical == element.vertices {
+        self.stay(&element, self.plan.canonical(element.vertices));
+    }
+
+    /// Leaves a triangle as it stands, unless its vertices have other numbers now.
+    fn stay(&mut self, element: &Element<'_>, vertices: [u32; 3]) {
+        if self.plan.placed(vertices) == element.vertices {
             self.seen = element.whole.end;
             self.count += 1;
         } else {
-            self.replace(&element, canonical, &inherit::all(&element));
+            self.replace(element, vertices, &inherit::all(element));
         }
     }
 
@@ -257,7 +273,8 @@ impl Writer<'_, '_> {
         self.put_triangle(name, vertices, attributes);
     }
 
-    fn put_triangle(&mut self, name: &[u8], [a, b, c]: [u32; 3], attributes: &[Attribute]) {
+    fn put_triangle(&mut self, name: &[u8], vertices: [u32; 3], attributes: &[Attribute]) {
+        let [a, b, c] = self.plan.placed(vertices);
         let mut tag = b"<".to_vec();
         tag.extend_from_slice(name);
         let _ = write!(tag, " v1=\"{a}\" v2=\"{b}\" v3=\"{c}\"");

@@ -18,8 +18,8 @@ use crate::topology::vertex_table::Weld;
 #[derive(Clone)]
 pub(crate) struct MeshText<'t> {
     pub(crate) text: &'t [u8],
-    /// Where the tag that ends the vertices begins.
-    pub(crate) vertices_end: usize,
+    /// What stands between the tags of the vertices.
+    pub(crate) vertices_within: Range<usize>,
     /// What stands between the tags of the triangles.
     pub(crate) triangles: Range<usize>,
     pub(crate) vertices: Vertices<'t>,
@@ -116,9 +116,22 @@ fn made(record: &Record, origin: FaceOrigin) -> Fate {
 pub(crate) struct Plan<'t> {
     /// By vertex of the text: the number that triangles take instead. `NONE` where no changed unit uses it.
     canonical: Vec<u32>,
-    /// Positions of the vertices that are new.
+    /// Positions of the vertices that are new, unit by unit. Their numbers here go on behind those of the text.
     pub(crate) fresh: Vec<Point>,
     pub(crate) units: Vec<UnitPlan<'t>>,
+    pub(crate) inserts: Vec<Insert>,
+}
+
+/// New vertices of a unit, and where they are put. PrusaSlicer takes all vertices from the smallest number of a volume to its largest for the
+/// volume's own, so that new ones must not stand behind those of others (its `src/libslic3r/Format/3mf.cpp`, `_generate_volumes`).
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Insert {
+    /// Before this vertex of the text.
+    pub(crate) at: u32,
+    /// Which of the new ones.
+    pub(crate) fresh: Range<u32>,
+    /// New ones that stand before these.
+    before: u32,
 }
 
 /// What a changed unit needs to be written.
@@ -135,22 +148,37 @@ const NONE: u32 = u32::MAX;
 impl<'t> Plan<'t> {
     /// O(n) in the triangles of changed units and of the edits. Memory: 4 bytes for each vertex of the text, some 60 for each of the largest unit.
     pub(crate) fn of(mesh: &MeshText<'t>, units: &[Unit<'_>]) -> Self {
-        let mut plan = Self { canonical: vec![NONE; mesh.vertices.len()], fresh: Vec::new(), units: Vec::new() };
+        let canonical = vec![NONE; mesh.vertices.len()];
+        let mut plan = Self { canonical, fresh: Vec::new(), units: Vec::new(), inserts: Vec::new() };
         let mut elements = mesh.elements();
         for unit in units {
+            let before = plan.fresh.len() as u32;
+            let mut end = 0;
             let unit_plan = match &unit.change {
                 None => {
                     elements.by_ref().take(unit.triangles).for_each(drop);
                     UnitPlan::default()
                 }
-                Some(change) => plan.number(mesh, &mut elements, change),
+                Some(change) => plan.number(mesh, &mut elements, change, &mut end),
             };
             plan.units.push(unit_plan);
+            let fresh = before..plan.fresh.len() as u32;
+            if !fresh.is_empty() {
+                let at = if units.len() == 1 { mesh.vertices.len() as u32 } else { end };
+                plan.inserts.push(Insert { at, fresh, before: 0 });
+            }
+        }
+        plan.inserts.sort_by_key(|insert| insert.at);
+        let mut before = 0;
+        for insert in &mut plan.inserts {
+            insert.before = before;
+            before += insert.fresh.len() as u32;
         }
         plan
     }
 
-    fn number(&mut self, mesh: &MeshText<'t>, elements: &mut Elements<'t>, change: &Change<'_>) -> UnitPlan<'t> {
+    /// `end` becomes the number behind the largest that the unit has.
+    fn number(&mut self, mesh: &MeshText<'t>, elements: &mut Elements<'t>, change: &Change<'_>, end: &mut u32) -> UnitPlan<'t> {
         let mut wanted = BTreeSet::new();
         change.each(|fate| {
             if let Fate::Part(of, _) = fate {
@@ -164,6 +192,7 @@ impl<'t> Plan<'t> {
         let mut parted = BTreeMap::new();
         for (k, element) in elements.by_ref().take(change.came.len()).enumerate() {
             for vertex in element.vertices {
+                *end = (*end).max(vertex.saturating_add(1));
                 let Some(position) = mesh.vertices.get(vertex.into()) else { continue };
                 let Some(canonical) = self.canonical.get_mut(vertex as usize) else { continue };
                 if !position.iter().all(|x| x.is_finite()) {
@@ -200,7 +229,23 @@ impl<'t> Plan<'t> {
         vertices.map(|vertex| self.canonical.get(vertex as usize).copied().filter(|own| *own != NONE).unwrap_or(vertex))
     }
 
-    /// The position of a vertex of the output.
+    /// The numbers in the output of vertices that have these here.
+    pub(crate) fn placed(&self, vertices: [u32; 3]) -> [u32; 3] {
+        let of_text = self.canonical.len() as u32;
+        vertices.map(|vertex| match vertex.checked_sub(of_text) {
+            None => {
+                let behind = self.inserts.partition_point(|insert| insert.at <= vertex);
+                let last = behind.checked_sub(1).and_then(|last| self.inserts.get(last));
+                vertex + last.map_or(0, |insert| insert.before + insert.fresh.len() as u32)
+            }
+            Some(fresh) => {
+                let own = self.inserts.iter().find(|insert| insert.fresh.contains(&fresh));
+                own.map_or(vertex, |insert| insert.at + insert.before + (fresh - insert.fresh.start))
+            }
+        })
+    }
+
+    /// The position of a vertex.
     pub(crate) fn position(&self, mesh: &MeshText<'_>, vertex: u32) -> Point {
         let fresh = || self.fresh.get((vertex as usize).checked_sub(mesh.vertices.len())?).copied();
         mesh.vertices.get(vertex.into()).or_else(fresh).unwrap_or_default()

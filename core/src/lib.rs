@@ -63,7 +63,7 @@ use std::path::Path;
 /// # Errors
 /// [`Error`]; nothing was written in any case.
 pub fn inspect(input: &Path, profile: &Profile, limits: &Limits, progress: &dyn Progress) -> error::Result<Report> {
-    engine::files::inspect(input, profile, limits, progress)
+    engine::entry::inspect(input, profile, limits, progress)
 }
 
 /// Repairs the file `input` into `output`, which must not exist: the caller owns a temporary name and publishes it. (Or it is an empty file
@@ -75,7 +75,7 @@ pub fn inspect(input: &Path, profile: &Profile, limits: &Limits, progress: &dyn 
 /// # Errors
 /// [`Error`]; what then stands at `output` is incomplete and to be removed.
 pub fn repair(input: &Path, output: &Path, profile: &Profile, limits: &Limits, progress: &dyn Progress) -> error::Result<Report> {
-    engine::files::repair(input, output, profile, limits, progress)
+    engine::entry::repair(input, output, profile, limits, progress)
 }
 
 /// Writes the triangles of the file `input` to the new file `output` in this format, and changes nothing of them; the written file is read back and

@@ -25,6 +25,7 @@ enum Part {
     ReadBack,
     LookAgain,
     Walls,
+    Encode,
 }
 
 /// In which work a stage is reckoned with.
@@ -64,7 +65,7 @@ const LOOKING: &str = "looking for defects";
 /// All stages, in order. The result is surveyed only where its difference from the input does not tell all: the weights are those of a mean.
 /// (Self-intersections are looked for chunk by chunk, as part of the topology.)
 /// A repair's weight is that of a file with few defects; [`DEFECTS`] is added for the part of the triangles that are at defects.
-const STEPS: [Step; 12] = [
+const STEPS: [Step; 15] = [
     step(Part::Look, "read", 4.0, Comes::Always, "reading the file"),
     step(Part::Look, "weld", 20.0, Comes::Sometimes, "joining corners that nearly meet"),
     step(Part::Look, "plan", 10.0, Comes::Always, "sorting triangles by place"),
@@ -77,6 +78,10 @@ const STEPS: [Step; 12] = [
     step(Part::LookAgain, "plan", 2.0, Comes::IfItWrites, CHECKING),
     step(Part::LookAgain, "topology", 9.0, Comes::IfItWrites, CHECKING),
     step(Part::Walls, "walls", 15.0, Comes::IfWallsMatter, "looking for thin walls"),
+    // Of results in other formats than STL.
+    step(Part::Encode, "number", 10.0, Comes::Sometimes, "numbering vertices"),
+    step(Part::Encode, "encode", 20.0, Comes::Sometimes, "writing the result in its format"),
+    step(Part::Encode, "pack", 20.0, Comes::Sometimes, "packing the result"),
 ];
 
 /// How far the work on one file is.

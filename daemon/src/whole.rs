@@ -122,7 +122,7 @@ mod tests {
 
     /// Each file is whole, and none of its beginnings is.
     #[test]
-    fn f22_every_format_says_where_it_ends() {
+    fn every_format_says_where_it_ends() {
         let stl = [&[0; 80][..], &2u32.to_le_bytes(), &[7; 100]].concat();
         let header = "ply\nformat binary_little_endian 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
             element face 1\nproperty list uchar int vertex_indices\nend_header\n";
@@ -140,7 +140,7 @@ mod tests {
     }
 
     #[test]
-    fn f22_text_without_a_mark_ends_with_a_line() {
+    fn text_without_a_mark_ends_with_a_line() {
         for text in ["v 0 0 0\nf 1 2 3\n", "OFF\n3 1 0\n", "ply\nformat ascii 1.0\n3 0 1 2\n"] {
             assert!(whole(text.as_bytes()) && !whole(&text.as_bytes()[..text.len() - 1]), "{text}");
             assert!(!whole(&[text.as_bytes(), &[0; 500]].concat()), "zeros behind {text}");

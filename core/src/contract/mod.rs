@@ -7,8 +7,10 @@
 
 pub(crate) mod access;
 pub(crate) mod builder;
+pub(crate) mod defects;
 pub(crate) mod edit_report;
 pub mod error;
+pub(crate) mod file_facts;
 pub(crate) mod finite;
 pub(crate) mod hint;
 pub(crate) mod judgement;

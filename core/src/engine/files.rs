@@ -16,15 +16,13 @@ use crate::detect::walls::Surface;
 use crate::diagnosis::Diagnosis;
 use crate::engine::clock::Clock;
 use crate::engine::everywhere;
-use crate::engine::formats::{self, Target};
 use crate::engine::judging::{self, Input, Written};
-use crate::engine::package::{self, Work};
 use crate::engine::welding;
 use crate::geometry::sums::Bounds;
 use crate::io::digest;
 use crate::io::digest::Digest;
 use crate::io::disk_space::{self, Need};
-use crate::io::read::{MeshFile, PREFIX_BYTES, PackageFile};
+use crate::io::read::{MeshFile, PREFIX_BYTES};
 use crate::io::read_ahead::Guide;
 use crate::io::record::Record;
 use crate::output::edit::Edit;
@@ -40,27 +38,6 @@ use crate::util::parallel;
 
 /// Fewer bytes are hashed by one thread: starting more would take longer.
 pub(crate) const HASHED_BY_ONE: usize = 1 << 20;
-
-/// Diagnoses `input` and writes nothing.
-///
-/// # Errors
-/// [`Error`], any of them; [`Error::Profile`] before the file is opened.
-pub(crate) fn inspect(input: &Path, profile: &Profile, limits: &Limits, progress: &dyn Progress) -> Result<Report> {
-    let mut clock = Clock::start();
-    judging::validate(input, profile)?;
-    let limits = &limits.spooling_beside(input);
-    if PackageFile::is_package(input)
-        && let Some(package) = PackageFile::open(input, limits, progress)?
-    {
-        let report = package::inspect(&package, Work { profile, limits, progress }, &mut clock)?;
-        let triangles = report.input.triangles as usize;
-        return clock.close(report, input, triangles);
-    }
-    let mesh = open(input, limits, progress)?;
-    clock.stage("read");
-    let report = look(&mesh, (profile, limits), progress, &mut clock)?;
-    clock.close(report, mesh.path(), mesh.records().len())
-}
 
 /// Diagnoses a mesh.
 pub(crate) fn look(
@@ -84,36 +61,6 @@ pub(crate) fn look(
     Ok(report)
 }
 
-/// Repairs `input` into the new file `output`, in the format that the profile names.
-///
-/// # Errors
-/// [`Error`], any of them; [`Error::Profile`] before the file is opened.
-pub(crate) fn repair(input: &Path, output: &Path, profile: &Profile, limits: &Limits, progress: &dyn Progress) -> Result<Report> {
-    let mut clock = Clock::start();
-    judging::validate(input, profile)?;
-    let limits = &limits.spooling_beside(output);
-    if PackageFile::is_package(input)
-        && let Some(package) = PackageFile::open(input, limits, progress)?
-    {
-        let report = package::repair_as(&package, output, Work { profile, limits, progress }, &mut clock)?;
-        let triangles = report.input.triangles as usize;
-        return clock.close(report, input, triangles);
-    }
-    let mesh = open(input, limits, progress)?;
-    let triangles = mesh.records().len();
-    let target = formats::target(mesh.format(), mesh.unit(), profile.format);
-    let report = match target.layout {
-        None => make(mesh, output, target, (profile, limits), progress, &mut clock)?.report,
-        Some(layout) => {
-            let make = |mesh, spool: &Path, clock: &mut Clock| {
-                make(mesh, spool, target, (profile, limits), progress, clock).map(|made| made.report)
-            };
-            formats::through_a_spool((mesh, input), output, (target, layout), limits, progress, &mut clock, make)?
-        }
-    };
-    clock.close(report, input, triangles)
-}
-
 /// A mesh that was repaired into an STL.
 pub(crate) struct Made {
     pub(crate) report: Report,
@@ -123,24 +70,24 @@ pub(crate) struct Made {
     pub(crate) edit: Edit,
 }
 
-/// Makes `mesh` the new STL `output`, or a copy of its file where that is good and of the `target`.
+/// Makes `mesh` the new STL `output`, or a copy of its file where that is good and of the output's format.
 pub(crate) fn make(
     mesh: MeshFile,
     output: &Path,
-    target: Target,
+    is_of_target: bool,
     (profile, limits): (&Profile, &Limits),
     progress: &dyn Progress,
     clock: &mut Clock,
 ) -> Result<Made> {
     if !profile.repair {
-        let report = pass_on(&mesh, output, target, (profile, limits), progress, clock)?;
+        let report = pass_on(&mesh, output, is_of_target, (profile, limits), progress, clock)?;
         return Ok(Made { report, mesh, edit: Edit::default() });
     }
     let (mesh, welded) = welding::in_the_stream(mesh, profile, limits, progress)?;
     clock.stage("read");
     check_space(&mesh, output, limits)?;
     let (report, edit) = emit::draft(&mesh, output, limits, progress, |draft| {
-        let mended = mend(draft, (&mesh, welded.as_ref()), (output, target), profile, limits, progress, clock);
+        let mended = mend(draft, (&mesh, welded.as_ref()), (output, is_of_target), profile, limits, progress, clock);
         mended.map_err(|error| or_changed(error, &mesh, progress))
     })?;
     Ok(Made { report, mesh, edit })
@@ -166,7 +113,7 @@ fn or_changed(error: Error, mesh: &MeshFile, progress: &dyn Progress) -> Error {
 fn pass_on(
     mesh: &MeshFile,
     output: &Path,
-    target: Target,
+    is_of_target: bool,
     (profile, limits): (&Profile, &Limits),
     progress: &dyn Progress,
     clock: &mut Clock,
@@ -178,7 +125,7 @@ fn pass_on(
     let mut report = judging::begin(Task::Repair, &subject(mesh, String::new()), &diagnosis, profile, limits);
     if report.verdict.good {
         drop(diagnosis);
-        let passed = copy((mesh, target), output, &mut report, limits, progress, clock);
+        let passed = copy((mesh, is_of_target), output, &mut report, limits, progress, clock);
         passed.map_err(|error| or_changed(error, mesh, progress))?;
     } else {
         report.input.blake3 = hash(mesh, limits, progress);
@@ -191,9 +138,9 @@ fn pass_on(
     Ok(report)
 }
 
-/// Copies a good file, or its triangles where it is not of the `target`, and reads the copy back.
+/// Copies a good file, or its triangles where it is not of the output's format, and reads the copy back.
 fn copy(
-    (mesh, target): (&MeshFile, Target),
+    (mesh, is_of_target): (&MeshFile, bool),
     output: &Path,
     report: &mut Report,
     limits: &Limits,
@@ -201,13 +148,13 @@ fn copy(
     clock: &mut Clock,
 ) -> Result<()> {
     let edit = Edit::default();
-    let content = if target.is_input { Content::Input } else { Content::Edited(&edit) };
+    let content = if is_of_target { Content::Input } else { Content::Edited(&edit) };
     let (written, digest) = emit::draft(mesh, output, limits, progress, |draft| draft.finish(&content))?;
     report.input.blake3 = digest::hash(mesh.bytes(), &digest);
     clock.stage("emit");
     report.edit = edit.summary(mesh.records().len());
     report.edit_records = limits.list_edit.then(|| edit.listed());
-    if target.is_input {
+    if is_of_target {
         confirm_copy(report, mesh, output, limits, progress)?;
     } else {
         let surface = report.before.bounds.map_or(Bounds::EMPTY, |[lo, hi]| Bounds { lo, hi });
@@ -223,7 +170,7 @@ fn copy(
 fn mend(
     draft: Draft<'_, '_>,
     (mesh, welded): (&MeshFile, Option<&Counts>),
-    (output, target): (&Path, Target),
+    (output, is_of_target): (&Path, bool),
     profile: &Profile,
     limits: &Limits,
     progress: &dyn Progress,
@@ -247,7 +194,7 @@ fn mend(
         None => edit,
     };
     let survey = Some(survey).filter(|_| set_right.is_none());
-    let mended = Mended { edit, evidence, surface, may_be_copied: welded.is_none() && target.is_input };
+    let mended = Mended { edit, evidence, surface, may_be_copied: welded.is_none() && is_of_target };
     let written = write(draft, mesh, &mended, survey, &mut report, (output, limits, progress), clock)?;
     judging::advise(&mut report, &mended.evidence);
     if let Some(counts) = welded {

@@ -7,6 +7,7 @@
 
 mod clock;
 mod edited_mesh;
+pub(crate) mod entry;
 mod everywhere;
 pub(crate) mod files;
 pub(crate) mod formats;

@@ -118,9 +118,19 @@ pub(super) fn folder_of<'a>(context: &'a Context, job: &Job) -> Result<&'a Folde
     Ok(folder)
 }
 
+/// The media type of a mesh of this name, where its format has one (RFC 2077, and those registered since).
+fn kind_of(name: &str) -> &'static str {
+    match name.rsplit_once('.').map(|(_, ending)| ending.to_ascii_lowercase()).as_deref() {
+        Some("stl") => "model/stl",
+        Some("3mf") => "model/3mf",
+        Some("obj") => "model/obj",
+        _ => "application/octet-stream",
+    }
+}
+
 async fn send(shared: &Shared, id: &str, which: Which, headers: &HeaderMap) -> Result<Response, Problem> {
     let opened = opened(shared, id_of(id)?, which).await?;
-    let kind = if which == Which::Report { "application/json" } else { "model/stl" };
+    let kind = if which == Which::Report { "application/json" } else { kind_of(&opened.name) };
     let (tag, name) = (format!("\"{}\"", opened.published), escaped(&opened.name));
     Ok(answer(opened, tag, kind, Some(format!("attachment; filename*=UTF-8''{name}")), headers))
 }

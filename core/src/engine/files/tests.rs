@@ -6,6 +6,7 @@ use super::*;
 use crate::contract::access::Access;
 use crate::contract::progress::Quiet;
 use crate::contract::report::{Hint, HintKind, Outcome};
+use crate::engine::entry::{inspect, repair};
 use crate::io::record::Record;
 use crate::testing::{Corners, cube, cuboid, plate, records, shaken_torus, shifted};
 

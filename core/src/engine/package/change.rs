@@ -7,13 +7,13 @@ use std::path::Path;
 
 use memmap2::Mmap;
 
+use super::corners::Corners;
 use super::units::{self, Nameless, UnitOf};
-use super::{Work, section};
+use super::work::{Work, section};
 use crate::contract::error::{Error, Result};
 use crate::contract::report::AttributesKept;
 use crate::engine::clock::Clock;
 use crate::engine::files::{self, Made};
-use crate::engine::formats::Target;
 use crate::engine::together::Section;
 use crate::io::read::{Archive, MeshFile, MeshRecords, PackageFile, Place, slicer};
 use crate::io::record::Record;
@@ -93,7 +93,7 @@ impl<'a> Maker<'a> {
         let text = mesh_text(self.package, place, &read);
         let is_edited = all.iter().any(|unit| unit.change.is_some());
         if !is_edited && model::is_numbered_once(&text, &units_as_they_are(&units, &read)) {
-            self.account.kept += read.with_property + read.with_vendor;
+            self.account.kept += read.with_any;
             return Ok(());
         }
         let all = if is_edited { with_numbers(&units, all, &read) } else { units_as_they_are(&units, &read) };
@@ -106,8 +106,7 @@ impl<'a> Maker<'a> {
         let Work { profile, limits, progress } = self.work;
         let (mesh, _held) = units::spooled(self.package, unit, read, self.work)?;
         let spool = Nameless::new(limits)?;
-        let target = Target { layout: None, is_input: true };
-        let made = files::make(mesh, &spool.path, target, (profile, limits), progress, clock)?;
+        let made = files::make(mesh, &spool.path, true, (profile, limits), progress, clock)?;
         sections.push(section(self.package, unit, made.report.clone(), &read.parsed.findings));
         let result = if made.report.output.is_some() { Some(files::open(&spool.path, limits, progress)?) } else { None };
         Ok(Mended { made, result, _spool: spool })
@@ -115,7 +114,7 @@ impl<'a> Maker<'a> {
 
     /// Notes what the object should be in the output.
     fn expect(&mut self, place: Place, units: &[UnitOf], mended: &[Option<Mended>], read: &MeshRecords) {
-        let mut corners = super::read_back::Corners::default();
+        let mut corners = Corners::default();
         for (unit, mended) in units.iter().zip(mended) {
             let result = mended.as_ref().and_then(|mended| mended.result.as_ref());
             corners.add(result.map_or_else(|| records_of(unit, read), MeshFile::records));

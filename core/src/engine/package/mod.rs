@@ -5,23 +5,22 @@
 //! welded or united, not even if they touch. The written package is read again, and each object compared with what it should be.
 
 mod change;
+mod corners;
 mod read_back;
 #[cfg(test)]
 mod tests;
 mod units;
+mod work;
 
 use std::path::Path;
 
 use crate::contract::error::{Error, Result};
-use crate::contract::hint::HintKind;
-use crate::contract::progress::Progress;
 use crate::contract::report::{FileFacts, Format, Outcome, Report, Task};
-use crate::contract::settings::{KeepAttributes, Limits, OutputFormat, Profile, folder_of};
+use crate::contract::settings::{KeepAttributes, OutputFormat, Profile, folder_of};
 use crate::engine::clock::Clock;
 use crate::engine::files;
 use crate::engine::formats;
-use crate::engine::judging;
-use crate::engine::together::{Section, together};
+use crate::engine::together::together;
 use crate::io::disk_space::{self, Need};
 use crate::io::read::PackageFile;
 use crate::output::emit;
@@ -29,14 +28,8 @@ use crate::output::model::Account;
 use crate::util::words::{self, Counted};
 use change::{Changed, Maker};
 use units::Nameless;
-
-/// Settings of a work on a package.
-#[derive(Clone, Copy)]
-pub(crate) struct Work<'a> {
-    pub(crate) profile: &'a Profile,
-    pub(crate) limits: &'a Limits,
-    pub(crate) progress: &'a dyn Progress,
-}
+pub(crate) use work::Work;
+use work::section;
 
 /// Diagnoses every object of a package, and writes nothing.
 ///
@@ -179,22 +172,6 @@ fn certify(report: &mut Report) {
             (faithful.original, faithful.bytes) = (report.input.blake3.clone(), report.input.bytes);
         }
     }
-}
-
-/// The report of one mesh as a section of the package's.
-fn section(package: &PackageFile, unit: &units::UnitOf, mut report: Report, findings: &[crate::io::read::Finding]) -> Section {
-    // A package says its unit.
-    report.hints.retain(|hint| !matches!(hint.kind, HintKind::Inches | HintKind::Metres));
-    let flaws = judging::flaws(findings);
-    report.input.findings = findings.iter().map(|finding| finding.text.clone()).collect();
-    if report.task == Task::Inspect && !flaws.is_empty() {
-        report.verdict.good = false;
-        report.outcome = Outcome::NotGood;
-        report.verdict.reasons.extend(flaws);
-    }
-    let (id, name, part) = package.names(unit.place);
-    let name = if unit.volume.is_empty() { name } else { [name.as_str(), unit.volume.as_str()].join(" ").trim().to_owned() };
-    Section { id, name, part, report }
 }
 
 fn facts(package: &PackageFile, blake3: String, triangles: u64) -> FileFacts {

@@ -5,7 +5,7 @@ use std::ops::Range;
 use std::os::fd::AsRawFd;
 use std::path::{Path, PathBuf};
 
-use super::Work;
+use super::work::Work;
 use crate::contract::error::{Error, Result};
 use crate::contract::settings::Limits;
 use crate::engine::files;

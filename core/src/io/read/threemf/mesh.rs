@@ -27,10 +27,8 @@ pub(crate) struct MeshRecords {
     pub(crate) positions: Items<POSITION_BYTES>,
     /// Triangles that the file has, with those that were left out.
     pub(crate) triangles: u64,
-    /// Triangles with properties of their own.
-    pub(crate) with_property: u64,
-    /// Triangles with attributes of vendors.
-    pub(crate) with_vendor: u64,
+    /// Triangles with properties of their own, or attributes of vendors.
+    pub(crate) with_any: u64,
 }
 
 impl MeshRecords {
@@ -69,8 +67,8 @@ impl Model {
         findings.extend(told.findings());
         let header = binary::header_of(object.name.as_bytes());
         let parsed = Parsed { records, findings, header, rounding: points.rounding.if_any(), unit: None };
-        let TriangleCounts { tally, with_property, with_vendor, .. } = told;
-        Ok(MeshRecords { parsed, positions, triangles: tally.faces, with_property, with_vendor })
+        let TriangleCounts { tally, with_any, .. } = told;
+        Ok(MeshRecords { parsed, positions, triangles: tally.faces, with_any })
     }
 }
 

@@ -127,8 +127,8 @@ pub(super) struct TriangleCounts {
     pub(super) tally: Tally,
     /// With the same vertex twice.
     pub(super) repeated: u64,
-    pub(super) with_property: u64,
-    pub(super) with_vendor: u64,
+    /// With properties of their own, or attributes of vendors.
+    pub(super) with_any: u64,
 }
 
 impl<'v> Shard<'v> {
@@ -143,8 +143,7 @@ impl<'v> Shard<'v> {
         let [a, b, c] = corners.indices;
         let [a, b, c] = [read(a), read(b), read(c)];
         self.counts.repeated += u64::from((a == b || b == c || c == a) && a.max(b).max(c) != u64::MAX);
-        self.counts.with_property += u64::from(corners.property);
-        self.counts.with_vendor += u64::from(corners.vendor);
+        self.counts.with_any += u64::from(corners.property || corners.vendor);
         self.faces.triangle([a, b, c]);
         a.max(b).max(c) != u64::MAX
     }
@@ -159,8 +158,7 @@ impl TriangleCounts {
     pub(super) fn append(&mut self, behind: Self) {
         self.tally.append(behind.tally);
         self.repeated += behind.repeated;
-        self.with_property += behind.with_property;
-        self.with_vendor += behind.with_vendor;
+        self.with_any += behind.with_any;
     }
 
     pub(super) fn findings(&self) -> Vec<Finding> {

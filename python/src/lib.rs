@@ -11,7 +11,7 @@ use std::path::PathBuf;
 
 use pyo3::prelude::*;
 use suture_core::operations::{self, Fill, Orient, Union, Wrap};
-use suture_core::{Limits, PatchShape, Profile, RepairName};
+use suture_core::{Limits, OutputFormat, PatchShape, Profile, RepairName};
 
 use arrays::{Faces, Loops, Pairs, Repaired, Vertices, repaired_arrays, view};
 use errors::{invalid, to_json};
@@ -109,8 +109,13 @@ fn repair_file(
     spool: Option<PathBuf>,
     progress: Option<Bound<'_, PyAny>>,
 ) -> PyResult<String> {
-    let (profile, mut limits) = (self::profile(profile)?, limits(memory, threads));
+    let (mut profile, mut limits) = (self::profile(profile)?, limits(memory, threads));
     limits.spool = spool;
+    // A name says its format, as on the command line; a profile may say another one.
+    let of_name = output.extension().and_then(|ending| OutputFormat::of_ending(ending.to_str()?));
+    if profile.format == OutputFormat::Input {
+        profile.format = of_name.unwrap_or(profile.format);
+    }
     to_json(&watched(py, progress.as_ref(), |watch| suture_core::repair(&input, &output, &profile, &limits, watch))?)
 }
 

@@ -247,6 +247,11 @@ class Files(unittest.TestCase):
         with self.assertRaisesRegex(FileExistsError, "never overwritten"):
             suture.repair_file(self.input, self.input, replace=True)
         suture.repair_file(self.output, Path(self.folder.name, "again.stl"))
+        other = Path(self.folder.name, "other.ply")
+        self.assertEqual(suture.repair_file(self.input, other)["output"]["format"], "ply")
+        self.assertTrue(other.read_bytes().startswith(b"ply\n"))
+        with self.assertRaises(ValueError):
+            suture.repair_file(self.input, Path(self.folder.name, "other.3mf"))
         report = suture.repair_file(self.input, Path(self.folder.name, "none.stl"), profile="inspect-only")
         self.assertEqual((report["outcome"], report["output"]), ("not_good", None))
         suture.repair_file(self.input, self.output, replace=True, profile="cautious")

@@ -257,7 +257,7 @@ class Files(unittest.TestCase):
         suture.repair_file(self.input, self.output, replace=True, profile="cautious")
         self.assertEqual(len(read_stl(self.output)), 11)
         self.assertEqual(self.input.read_bytes(), before)
-        self.assertEqual(sorted(os.listdir(self.folder.name)), ["again.stl", "in.stl", "out.stl"])
+        self.assertEqual(sorted(os.listdir(self.folder.name)), ["again.stl", "in.stl", "other.ply", "out.stl"])
 
     def test_errors_have_classes_that_python_knows(self):
         picture = Path(self.folder.name, "picture.stl")

@@ -15,6 +15,11 @@ const STEP: usize = 256 << 10;
 /// An entry that is read into memory has no more bytes.
 const SMALL: u64 = 1 << 20;
 
+/// An entry that unpacks to more than this many times its size is a bomb, unless it is as small as this. Texts of models shrink to a tenth; deflate can
+/// shrink zeros to a thousandth (RFC 1951: 258 bytes in two bits).
+const MOST_TIMES: u64 = 200;
+const HARMLESS: u64 = 64 << 20;
+
 /// Why the content of an entry is not read: damage, or what became of it on its way.
 enum Failure {
     Damaged(String),
@@ -45,6 +50,11 @@ impl Archive<'_> {
     /// [`Error::NoSpace`] if there is no room for the bytes that the entry claims, [`Error::Unreadable`] if it is damaged or has more of them,
     /// [`Error::Io`], also when the progress cancels.
     pub(crate) fn spooled(&self, entry: &Entry, context: &Context<'_>) -> Result<Items<1>> {
+        if entry.plain > HARMLESS && entry.plain / entry.packed.max(1) > MOST_TIMES {
+            let reason =
+                format!("claims to unpack to {} times its size, as no model does", Count(entry.plain / entry.packed.max(1)));
+            return Err(refused(&entry.name, reason).at(context.path));
+        }
         context.make_room(entry.plain, "the content of the archive")?;
         let mut spool = context.text()?;
         self.unpack(entry, context, |bytes| spool.append(bytes.as_chunks().0))?;

@@ -164,6 +164,18 @@ fn a_claim_of_more_than_the_machine_has_is_refused_before_it_is_believed() {
 }
 
 #[test]
+fn f14_a_bomb_is_refused_before_it_is_unpacked() {
+    let mut state = 1u64;
+    let mut noise = || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+        (state >> 56) as u8
+    };
+    let content: Vec<u8> = (0..150_000).map(|_| noise()).collect();
+    let bomb = Member { more: 90 << 20, ..member("3D/3dmodel.model", content) };
+    assert!(reason(&zip(&[bomb])).contains("times its size"));
+}
+
+#[test]
 fn damaged_data_is_refused() {
     let good = zip(&[member("a", long())]);
     let packed = deflate(&long()).len();

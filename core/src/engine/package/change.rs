@@ -8,8 +8,9 @@ use std::path::Path;
 use memmap2::Mmap;
 
 use super::corners::Corners;
+use super::section::section;
 use super::units::{self, Nameless, UnitOf};
-use super::work::{Work, section};
+use super::work::Work;
 use crate::contract::error::{Error, Result};
 use crate::contract::report::AttributesKept;
 use crate::engine::clock::Clock;

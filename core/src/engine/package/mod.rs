@@ -7,6 +7,7 @@
 mod change;
 mod corners;
 mod read_back;
+mod section;
 #[cfg(test)]
 mod tests;
 mod units;
@@ -27,9 +28,9 @@ use crate::output::emit;
 use crate::output::model::Account;
 use crate::util::words::{self, Counted};
 use change::{Changed, Maker};
+use section::section;
 use units::Nameless;
 pub(crate) use work::Work;
-use work::section;
 
 /// Diagnoses every object of a package, and writes nothing.
 ///

@@ -270,8 +270,10 @@ impl<'a> File<'a> {
             found.push(Finding::loss(format!("{} with too few numbers", Counted(vertices.bent + read.bent, "line", "lines"))));
         }
         let mut line = Line { text: self.bytes, at: read.end, within: false, comments: true };
-        let bytes = (self.bytes.len() - read.end.min(self.bytes.len())) as u64;
-        if read.rows == self.header.faces && bytes > 0 && (self.header.binary || line.token().is_some()) {
+        let behind = self.bytes.get(read.end..).unwrap_or_default();
+        let behind = if self.header.binary { behind } else { line.token().unwrap_or_default() };
+        let bytes = behind.len() as u64;
+        if read.rows == self.header.faces && bytes > 0 {
             let text = format!("{} after the last face, ignored", Counted(bytes, "byte", "bytes"));
             found.push(Finding { harmless: true, ..Finding::flaw(text) });
         }

@@ -6,7 +6,7 @@
 //! `src/libslic3r/Model.cpp` (`FacetsAnnotation::get_triangle_as_string`, `set_triangle_from_string`).
 //!
 //! **In:** these digits.
-//! **Out:** a tree, [`Paint`]; its areas; the paint of the turned or mirrored triangle; the paint of a piece of the triangle ([`Piece`]).
+//! **Out:** a tree, [`Paint`]; its areas; the paint of the turned or mirrored triangle; the paint of a piece of the triangle ([`Paint::piece`]).
 //! **Promise:** each text that slicers write comes back digit by digit. Turns and mirrors are exact. A piece's share of each state is right
 //! to 10⁻⁴ of the piece.
 

@@ -194,7 +194,7 @@ impl MeshFile {
         self.opened.size()
     }
 
-    /// The path it was opened by, or what it is [called](Self::called).
+    /// The path it was opened by, or the name that it was given for errors and reports.
     pub fn path(&self) -> &Path {
         &self.name
     }

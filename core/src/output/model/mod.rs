@@ -61,7 +61,7 @@ pub(crate) struct Written {
     pub(crate) triangles: Vec<u64>,
 }
 
-/// Does each triangle of these units refer to the vertex that [`write`] would have it refer to?
+/// Does each triangle of these units refer to the vertex that [`write()`] would have it refer to?
 pub(crate) fn is_numbered_once(mesh: &MeshText<'_>, units: &[Unit<'_>]) -> bool {
     let plan = Plan::of(mesh, units);
     mesh.elements().all(|element| plan.canonical(element.vertices) == element.vertices)

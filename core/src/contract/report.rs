@@ -90,7 +90,7 @@ pub struct Report {
     /// together, and an outcome is the worst of theirs.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub objects: Vec<ObjectReport>,
-    /// What became of colours, paint and other attributes of triangles; `None` where the file has none, or its format's are not carried over.
+    /// The fate of colours, paint and other attributes of triangles; `None` where the file has none, or its format's are not carried over.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub attributes: Option<AttributesKept>,
     /// Walls thinner than the profile's minimum; `None` if there is no minimum, or a hint says why it was not looked.
@@ -102,7 +102,7 @@ pub struct Report {
     pub cost: Cost,
 }
 
-/// What became of attributes, in triangles that have any.
+/// The fate of attributes, in triangles that have any.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct AttributesKept {
@@ -110,7 +110,7 @@ pub struct AttributesKept {
     pub kept: u64,
     /// Triangles of the result that are parts of others, and say the same of each place but for rounding.
     pub divided: u64,
-    /// Those that are parts or were turned, and say it about.
+    /// Triangles of the result that are parts of others or were turned, and say it about.
     pub approximated: u64,
     /// New triangles, which took the attributes of most of the rim around them.
     pub inherited: u64,
@@ -140,9 +140,9 @@ pub struct ObjectReport {
     pub repairs: Vec<Repair>,
     /// The edit in numbers.
     pub edit: EditSummary,
-    /// What it is as it was written, or as it came.
+    /// The verdict on it as it was written, or as it came.
     pub verdict: Verdict,
-    /// What every rule found. Its hash and length are of a binary STL of the object.
+    /// The finding of every rule. Its hash and length are of a binary STL of the object.
     pub certificate: Option<Certificate>,
 }
 

@@ -19,9 +19,7 @@ pub(crate) fn inspect(input: &Path, profile: &Profile, limits: &Limits, progress
     let mut clock = Clock::start();
     judging::validate(input, profile)?;
     let limits = &limits.spooling_beside(input);
-    if PackageFile::is_package(input)
-        && let Some(package) = PackageFile::open(input, limits, progress)?
-    {
+    if let Some(package) = PackageFile::open(input, limits, progress)? {
         let report = package::inspect(&package, Work { profile, limits, progress }, &mut clock)?;
         let triangles = report.input.triangles as usize;
         return clock.close(report, input, triangles);
@@ -40,9 +38,7 @@ pub(crate) fn repair(input: &Path, output: &Path, profile: &Profile, limits: &Li
     let mut clock = Clock::start();
     judging::validate(input, profile)?;
     let limits = &limits.spooling_beside(output);
-    if PackageFile::is_package(input)
-        && let Some(package) = PackageFile::open(input, limits, progress)?
-    {
+    if let Some(package) = PackageFile::open(input, limits, progress)? {
         let report = package::repair_as(&package, output, Work { profile, limits, progress }, &mut clock)?;
         let triangles = report.input.triangles as usize;
         return clock.close(report, input, triangles);

@@ -3,8 +3,7 @@
 //! A mesh is repaired into a nameless STL, which is judged. Its triangles then become the output, which is read back and compared with them corner
 //! by corner: so the verdict holds of the output, too. A file that is good as it comes, and of the output's format, is copied instead.
 
-use std::os::fd::AsRawFd;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use rayon::prelude::*;
 
@@ -18,7 +17,7 @@ use crate::geometry::position;
 use crate::io::disk_space::{self, Need};
 use crate::io::read::MeshFile;
 use crate::io::record::{self, Record};
-use crate::io::write_behind;
+use crate::io::write_behind::Nameless;
 use crate::output::edit::Edit;
 use crate::output::emit::{self, Content};
 use crate::output::encode::{self, Layout};
@@ -83,8 +82,8 @@ pub(crate) fn through_a_spool(
     make: impl FnOnce(MeshFile, &Path, &mut Clock) -> Result<Report>,
 ) -> Result<Report> {
     check_space(&mesh, output, Some(layout), limits)?;
-    let (file, _) = write_behind::nameless(&limits.spool_folder(), limits)?;
-    let spool = PathBuf::from(format!("/proc/self/fd/{}", file.as_raw_fd()));
+    let nameless = Nameless::new(limits)?;
+    let spool = nameless.path();
     let mut report = make(mesh, &spool, clock)?;
     let Some(made) = report.output.as_ref() else { return Ok(report) };
     let is_copy = target.is_input && made.blake3 == report.input.blake3;

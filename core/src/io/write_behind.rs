@@ -6,7 +6,8 @@
 
 use std::fs::File;
 use std::io::{self, Write};
-use std::path::Path;
+use std::os::fd::AsRawFd;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::thread::JoinHandle;
@@ -84,6 +85,26 @@ pub(crate) fn nameless(folder: &Path, limits: &Limits) -> Result<(File, WriteBeh
     let file = tempfile::tempfile_in(folder).map_err(making())?;
     let behind = WriteBehind::new(&file, limits).map_err(making())?;
     Ok((file, behind))
+}
+
+/// A file without a name, and the path that leads to it as long as this value lives.
+pub(crate) struct Nameless {
+    file: File,
+}
+
+impl Nameless {
+    /// An empty one where spools go.
+    pub(crate) fn new(limits: &Limits) -> Result<Self> {
+        nameless(&limits.spool_folder(), limits).map(|(file, _)| Self::of(file))
+    }
+
+    pub(crate) fn of(file: File) -> Self {
+        Self { file }
+    }
+
+    pub(crate) fn path(&self) -> PathBuf {
+        format!("/proc/self/fd/{}", self.file.as_raw_fd()).into()
+    }
 }
 
 /// A file without a name where spools go, with what `fill` appends. Without room for so many bytes it is refused, in the name of `path`, before it begins.

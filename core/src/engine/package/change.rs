@@ -9,7 +9,7 @@ use memmap2::Mmap;
 
 use super::corners::Corners;
 use super::section::section;
-use super::units::{self, Nameless, UnitOf};
+use super::units::{self, UnitOf};
 use super::work::Work;
 use crate::contract::error::{Error, Result};
 use crate::contract::report::AttributesKept;
@@ -18,7 +18,7 @@ use crate::engine::files::{self, Made};
 use crate::engine::together::Section;
 use crate::io::read::{Archive, MeshFile, MeshRecords, PackageFile, Place, slicer};
 use crate::io::record::Record;
-use crate::io::write_behind::{self, WriteBehind};
+use crate::io::write_behind::{self, Nameless, WriteBehind};
 use crate::output::archive;
 use crate::output::edit::Edit;
 use crate::output::model::{self, Account, Change, MeshText, Unit};
@@ -93,11 +93,14 @@ impl<'a> Maker<'a> {
         let all: Vec<Unit<'_>> = units.iter().zip(&mended).map(|(unit, mended)| what_became(unit, mended.as_ref())).collect();
         let text = mesh_text(self.package, place, &read);
         let is_edited = all.iter().any(|unit| unit.change.is_some());
-        if !is_edited && model::is_numbered_once(&text, &units_as_they_are(&units, &read)) {
+        let same = units_as_they_are(&units, &read);
+        if !is_edited && model::is_numbered_once(&text, &same) {
             self.account.kept += read.with_any;
             return Ok(());
         }
-        let all = if is_edited { with_numbers(&units, all, &read) } else { units_as_they_are(&units, &read) };
+        // Vertices of units that stay are numbered anew beside those of others.
+        let all: Vec<Unit<'_>> =
+            all.iter().zip(&same).map(|(unit, same)| if unit.change.is_some() { *unit } else { *same }).collect();
         self.write(place, &text, &all)?;
         clock.stage("emit");
         Ok(())
@@ -107,9 +110,9 @@ impl<'a> Maker<'a> {
         let Work { profile, limits, progress } = self.work;
         let (mesh, _held) = units::spooled(self.package, unit, read, self.work)?;
         let spool = Nameless::new(limits)?;
-        let made = files::make(mesh, &spool.path, true, (profile, limits), progress, clock)?;
+        let made = files::make(mesh, &spool.path(), true, (profile, limits), progress, clock)?;
         sections.push(section(self.package, unit, made.report.clone(), &read.parsed.findings));
-        let result = if made.report.output.is_some() { Some(files::open(&spool.path, limits, progress)?) } else { None };
+        let result = if made.report.output.is_some() { Some(files::open(&spool.path(), limits, progress)?) } else { None };
         Ok(Mended { made, result, _spool: spool })
     }
 
@@ -242,10 +245,4 @@ fn units_as_they_are<'u>(units: &[UnitOf], read: &'u MeshRecords) -> Vec<Unit<'u
         Unit { triangles: records.len(), change }
     };
     units.iter().map(of).collect()
-}
-
-/// Vertices of units that stay are numbered anew where those of others are.
-fn with_numbers<'u>(units: &[UnitOf], all: Vec<Unit<'u>>, read: &'u MeshRecords) -> Vec<Unit<'u>> {
-    let same = units_as_they_are(units, read);
-    all.into_iter().zip(same).map(|(unit, same)| if unit.change.is_some() { unit } else { same }).collect()
 }

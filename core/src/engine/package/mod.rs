@@ -24,12 +24,12 @@ use crate::engine::formats;
 use crate::engine::together::together;
 use crate::io::disk_space::{self, Need};
 use crate::io::read::PackageFile;
+use crate::io::write_behind::Nameless;
 use crate::output::emit;
 use crate::output::model::Account;
 use crate::util::words::{self, Counted};
 use change::{Changed, Maker};
 use section::section;
-use units::Nameless;
 pub(crate) use work::Work;
 
 /// Diagnoses every object of a package, and writes nothing.
@@ -68,9 +68,9 @@ pub(crate) fn repair_as(package: &PackageFile, output: &Path, work: Work<'_>, cl
         return repair(package, output, work, clock);
     }
     let spool = Nameless::new(work.limits)?;
-    let mut report = repair(package, &spool.path, work, clock)?;
+    let mut report = repair(package, &spool.path(), work, clock)?;
     if report.output.is_some() {
-        let converted = formats::convert(&spool.path, output, work.profile.format, work.limits, work.progress)?;
+        let converted = formats::convert(&spool.path(), output, work.profile.format, work.limits, work.progress)?;
         clock.stage("encode");
         report.output = Some(converted.output);
         certify(&mut report);

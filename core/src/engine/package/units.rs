@@ -2,8 +2,7 @@
 
 use std::fs::File;
 use std::ops::Range;
-use std::os::fd::AsRawFd;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use super::work::Work;
 use crate::contract::error::{Error, Result};
@@ -11,7 +10,7 @@ use crate::contract::settings::Limits;
 use crate::engine::files;
 use crate::io::read::{MeshFile, MeshRecords, PREFIX_BYTES, PackageFile, Place};
 use crate::io::record::Record;
-use crate::io::write_behind;
+use crate::io::write_behind::{self, Nameless};
 
 /// Triangles of an object that are one mesh.
 pub(super) struct UnitOf {
@@ -57,25 +56,6 @@ pub(super) fn of(package: &PackageFile, place: Place, read: &MeshRecords) -> Res
     Ok(all)
 }
 
-/// A file without a name, and the path that leads to it.
-pub(super) struct Nameless {
-    _file: File,
-    pub(super) path: PathBuf,
-}
-
-impl Nameless {
-    /// Empty.
-    pub(super) fn new(limits: &Limits) -> Result<Self> {
-        let (file, _) = write_behind::nameless(&limits.spool_folder(), limits)?;
-        Ok(Self::of(file))
-    }
-
-    fn of(file: File) -> Self {
-        let path = PathBuf::from(format!("/proc/self/fd/{}", file.as_raw_fd()));
-        Self { _file: file, path }
-    }
-}
-
 /// The triangles of a unit as an STL of their own, opened; it is there as long as the file is held. Errors and reports name it as the package.
 ///
 /// # Errors
@@ -84,7 +64,7 @@ pub(super) fn spooled(package: &PackageFile, unit: &UnitOf, read: &MeshRecords, 
     let records = read.parsed.records.all().get(unit.triangles.clone()).unwrap_or_default();
     let file = stl(package.path(), &read.parsed.header, records, work.limits)?;
     let spool = Nameless::of(file);
-    Ok((files::open(&spool.path, work.limits, work.progress)?.called(package.path()), spool))
+    Ok((files::open(&spool.path(), work.limits, work.progress)?.called(package.path()), spool))
 }
 
 fn stl(path: &Path, header: &[u8], records: &[Record], limits: &Limits) -> Result<File> {

@@ -39,7 +39,7 @@ pub(crate) struct PackageFile {
 
 impl PackageFile {
     /// Does the file begin as an archive that holds a 3MF does? A file that cannot be read does not.
-    pub(crate) fn is_package(path: &Path) -> bool {
+    fn is_package(path: &Path) -> bool {
         use std::io::Read;
         let mut head = [0; 4];
         // A pipe would block; no regular file does.
@@ -47,11 +47,14 @@ impl PackageFile {
         is_file && std::fs::File::open(path).and_then(|mut file| file.read_exact(&mut head)).is_ok() && head == *b"PK\x03\x04"
     }
 
-    /// Opens a package; `None`: the archive is none. O(text) in its models; each is unpacked into a spool.
+    /// Opens a package; `None`: the file is none. O(text) in its models; each is unpacked into a spool.
     ///
     /// # Errors
     /// [`crate::Error`] of reading, with a reason that names the entry, the part or the object.
     pub(crate) fn open(path: &Path, limits: &Limits, progress: &dyn Progress) -> Result<Option<Self>> {
+        if !Self::is_package(path) {
+            return Ok(None);
+        }
         let spool = limits.spool_folder();
         let (opened, input, _) = Opened::bytes(path, &spool, limits, progress)?;
         let context = Context { path, spool: &spool, limits, progress };

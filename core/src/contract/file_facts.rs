@@ -49,6 +49,8 @@ pub enum Format {
     BinaryStl,
     /// A text STL.
     AsciiStl,
+    /// No file: a mesh that a program handed over in memory.
+    Memory,
     /// A 3MF package.
     #[serde(rename = "3mf")]
     ThreeMf,
@@ -60,8 +62,6 @@ pub enum Format {
     Ply,
     /// An OFF, as text or in binary.
     Off,
-    /// No file: a mesh that a program handed over in memory.
-    Memory,
 }
 
 impl Format {

@@ -7,7 +7,8 @@ use crate::contract::progress::Progress;
 use crate::contract::report::Report;
 use crate::contract::settings::{Limits, Profile};
 use crate::engine::clock::Clock;
-use crate::engine::package::{self, Work};
+use crate::engine::package;
+use crate::engine::work::Work;
 use crate::engine::{files, formats, judging};
 use crate::io::read::PackageFile;
 
@@ -50,9 +51,16 @@ pub(crate) fn repair(input: &Path, output: &Path, profile: &Profile, limits: &Li
         None => files::make(mesh, output, target.is_input, (profile, limits), progress, &mut clock)?.report,
         Some(layout) => {
             let make = |mesh, spool: &Path, clock: &mut Clock| {
-                files::make(mesh, spool, target.is_input, (profile, limits), progress, clock).map(|made| made.report)
+                files::make(mesh, spool, target.is_input, (profile, limits), progress, clock)
             };
-            formats::through_a_spool((mesh, input), output, (target, layout), limits, progress, &mut clock, make)?
+            formats::through_a_spool(
+                (mesh, input),
+                output,
+                (target, layout),
+                Work { profile, limits, progress },
+                &mut clock,
+                make,
+            )?
         }
     };
     clock.close(report, input, triangles)

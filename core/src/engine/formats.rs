@@ -11,17 +11,22 @@ use crate::contract::error::{Error, Result};
 use crate::contract::progress::Progress;
 use crate::contract::report::{Converted, Format, Report};
 use crate::contract::settings::{Limits, OutputFormat, folder_of};
+use crate::engine::carried;
 use crate::engine::clock::Clock;
-use crate::engine::files;
+use crate::engine::files::{self, Made};
+use crate::engine::work::Work;
 use crate::geometry::position;
 use crate::io::disk_space::{self, Need};
 use crate::io::read::MeshFile;
 use crate::io::record::{self, Record};
+use crate::io::rows::Said;
 use crate::io::write_behind::Nameless;
 use crate::output::edit::Edit;
 use crate::output::emit::{self, Content};
 use crate::output::encode::{self, Layout};
 use crate::output::indexed::Indexed;
+use crate::output::model::Account;
+use crate::output::rows::Planned;
 use crate::util::parallel;
 use crate::util::words::triangles;
 
@@ -68,7 +73,8 @@ fn layout_of(format: Format, unit: Option<&'static str>) -> Option<Layout> {
     }
 }
 
-/// Makes `mesh` of `input` the new file `output` in `layout`, by an STL that `make` writes.
+/// Makes `mesh` of `input` the new file `output` in `layout`, by an STL that `make` writes. What the file says besides positions and faces is kept
+/// where the output is of its format.
 ///
 /// # Errors
 /// [`Error`], any of them.
@@ -76,26 +82,29 @@ pub(crate) fn through_a_spool(
     (mesh, input): (MeshFile, &Path),
     output: &Path,
     (target, layout): (Target, Layout),
-    limits: &Limits,
-    progress: &dyn Progress,
+    work: Work<'_>,
     clock: &mut Clock,
-    make: impl FnOnce(MeshFile, &Path, &mut Clock) -> Result<Report>,
+    make: impl FnOnce(MeshFile, &Path, &mut Clock) -> Result<Made>,
 ) -> Result<Report> {
+    let Work { profile, limits, progress } = work;
     check_space(&mesh, output, Some(layout), limits)?;
     let nameless = Nameless::new(limits)?;
     let spool = nameless.path();
-    let mut report = make(mesh, &spool, clock)?;
-    let Some(made) = report.output.as_ref() else { return Ok(report) };
-    let is_copy = target.is_input && made.blake3 == report.input.blake3;
-    let written = if is_copy {
-        copy(input, output, limits, progress)?
-    } else {
-        let made = files::open(&spool, limits, progress)?;
-        let written = encode(&made, output, layout, limits, progress)?;
-        clock.stage("encode");
-        confirm(&made, &written, limits)?;
-        written
-    };
+    let made = make(mesh, &spool, clock)?;
+    let mut report = made.report.clone();
+    let Some(facts) = report.output.as_ref() else { return Ok(report) };
+    let is_copy = target.is_input && facts.blake3 == report.input.blake3;
+    let said = Said::by(&made.mesh);
+    let planned = if target.is_input && !is_copy { carried::plan(&said, &made) } else { None };
+    let triangles = made.mesh.records().len();
+    let account = carried::account(&said, planned.as_ref(), triangles);
+    let account = account.map(|account| if is_copy { Account { kept: triangles as u64, ..Account::default() } } else { account });
+    report.attributes = account.map(Account::told);
+    if !carried::heed(&mut report, profile, account.and_then(carried::harm)) {
+        return Ok(report);
+    }
+    let written =
+        if is_copy { copy(input, output, limits, progress)? } else { write(&spool, output, (planned, layout), work, clock)? };
     let facts = files::facts(&written, files::hash(&written, limits, progress));
     if is_copy && facts.blake3 != report.input.blake3 {
         return Err(Error::Changed { path: input.into() });
@@ -106,6 +115,27 @@ pub(crate) fn through_a_spool(
     }
     report.output = Some(facts);
     Ok(report)
+}
+
+/// Writes the STL `spool` to the new file `output`, in the rows of its file where there is a plan of that, and reads it back.
+fn write(
+    spool: &Path,
+    output: &Path,
+    (planned, layout): (Option<Planned<'_>>, Layout),
+    Work { limits, progress, .. }: Work<'_>,
+    clock: &mut Clock,
+) -> Result<MeshFile> {
+    let made = files::open(spool, limits, progress)?;
+    let written = match &planned {
+        Some(planned) => carried::write(planned, output, limits, progress)?,
+        None => encode(&made, output, layout, limits, progress)?,
+    };
+    clock.stage("encode");
+    match &planned {
+        Some(planned) => carried::confirm(planned, &made, &written)?,
+        None => confirm(&made, &written, limits)?,
+    }
+    Ok(written)
 }
 
 /// Writes the triangles of the file `input` to the new file `output` in another format, and changes nothing of them. A file that has this format is

@@ -5,6 +5,7 @@
 //! **Promise:** what stands at that path is complete and synced when a report is returned. The input is what it was at the beginning, or
 //! the result is thrown away. A mesh from memory becomes the mesh that its file would become, face by face.
 
+mod carried;
 mod clock;
 mod edited_mesh;
 pub(crate) mod entry;
@@ -18,3 +19,4 @@ pub mod operations;
 mod package;
 mod together;
 mod welding;
+mod work;

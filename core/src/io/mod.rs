@@ -11,4 +11,5 @@ pub(crate) mod disk_space;
 pub mod read;
 pub(crate) mod read_ahead;
 pub mod record;
+pub(crate) mod rows;
 pub(crate) mod write_behind;

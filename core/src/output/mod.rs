@@ -14,3 +14,4 @@ pub(crate) mod incremental;
 pub(crate) mod indexed;
 pub(crate) mod model;
 pub(crate) mod readback;
+pub(crate) mod rows;

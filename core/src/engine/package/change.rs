@@ -10,12 +10,11 @@ use memmap2::Mmap;
 use super::corners::Corners;
 use super::section::section;
 use super::units::{self, UnitOf};
-use super::work::Work;
 use crate::contract::error::{Error, Result};
-use crate::contract::report::AttributesKept;
 use crate::engine::clock::Clock;
 use crate::engine::files::{self, Made};
 use crate::engine::together::Section;
+use crate::engine::work::Work;
 use crate::io::read::{Archive, MeshFile, MeshRecords, PackageFile, Place, slicer};
 use crate::io::record::Record;
 use crate::io::write_behind::{self, Nameless, WriteBehind};
@@ -207,14 +206,6 @@ impl Changed {
             self.content.get(&entry).map(|map| &map[..]).or_else(config)
         };
         archive::write(&archive, replaced, output, work.limits, work.progress)
-    }
-}
-
-impl Account {
-    /// For the report.
-    pub(super) fn told(self) -> AttributesKept {
-        let Self { kept, divided, approximated, inherited, lost } = self;
-        AttributesKept { kept, divided, approximated, inherited, lost }
     }
 }
 

@@ -11,7 +11,6 @@ mod section;
 #[cfg(test)]
 mod tests;
 mod units;
-mod work;
 
 use std::path::Path;
 
@@ -22,6 +21,7 @@ use crate::engine::clock::Clock;
 use crate::engine::files;
 use crate::engine::formats;
 use crate::engine::together::together;
+use crate::engine::work::Work;
 use crate::io::disk_space::{self, Need};
 use crate::io::read::PackageFile;
 use crate::io::write_behind::Nameless;
@@ -30,7 +30,6 @@ use crate::output::model::Account;
 use crate::util::words::{self, Counted};
 use change::{Changed, Maker};
 use section::section;
-pub(crate) use work::Work;
 
 /// Diagnoses every object of a package, and writes nothing.
 ///

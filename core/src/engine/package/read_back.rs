@@ -4,8 +4,8 @@ use std::path::Path;
 
 use super::change::Changed;
 use super::corners::Corners;
-use super::work::Work;
 use crate::contract::error::{Error, Result};
+use crate::engine::work::Work;
 use crate::io::read::PackageFile;
 
 /// Reads the package at `output` and compares its objects with what is expected.

@@ -4,10 +4,10 @@ use std::fs::File;
 use std::ops::Range;
 use std::path::Path;
 
-use super::work::Work;
 use crate::contract::error::{Error, Result};
 use crate::contract::settings::Limits;
 use crate::engine::files;
+use crate::engine::work::Work;
 use crate::io::read::{MeshFile, MeshRecords, PREFIX_BYTES, PackageFile, Place};
 use crate::io::record::Record;
 use crate::io::write_behind::{self, Nameless};

@@ -5,6 +5,7 @@ use super::limits::HEADER_BYTES;
 use super::opened::Opened;
 use super::rounding::Rounding;
 use super::spool::{Context, Items, Parsed};
+use super::vertices::{Positions, Vertices};
 use super::{amf, binary, obj, off, ply, sniff, tail, text, unpacked};
 use crate::contract::error::Result;
 use crate::contract::progress::Progress;
@@ -41,6 +42,7 @@ pub struct MeshFile {
     findings: Vec<Finding>,
     header: [u8; HEADER_BYTES],
     unit: Option<&'static str>,
+    positions: Option<Positions>,
 }
 
 /// What the bytes of a file hold.
@@ -50,6 +52,7 @@ struct Content {
     findings: Vec<Finding>,
     header: [u8; HEADER_BYTES],
     unit: Option<&'static str>,
+    positions: Option<Positions>,
 }
 
 impl Content {
@@ -58,7 +61,14 @@ impl Content {
             sniff::Kind::Binary(sniff::Layout { triangles, mut findings }) => {
                 findings.extend(tail::of_records(binary::records(input, triangles)));
                 let header = binary::safe_header(binary::header(input));
-                Ok(Self { source: Source::InPlace(triangles), format: Format::BinaryStl, findings, header, unit: None })
+                Ok(Self {
+                    source: Source::InPlace(triangles),
+                    format: Format::BinaryStl,
+                    findings,
+                    header,
+                    unit: None,
+                    positions: None,
+                })
             }
             sniff::Kind::Text(sniff::Text { start, mut findings }) => {
                 // Advice; without it reading ahead is only less bold.
@@ -97,9 +107,9 @@ impl Content {
 
     /// `findings`: those of the bytes themselves.
     fn parsed(parsed: Parsed, format: Format, findings: Vec<Finding>) -> Self {
-        let Parsed { records, findings: mut found, header, rounding, unit } = parsed;
+        let Parsed { records, findings: mut found, header, rounding, unit, positions } = parsed;
         found.extend(rounding.map(Rounding::finding));
-        Self { source: Source::Spooled(records), format, findings: [findings, found].concat(), header, unit }
+        Self { source: Source::Spooled(records), format, findings: [findings, found].concat(), header, unit, positions }
     }
 }
 
@@ -116,8 +126,8 @@ impl MeshFile {
         let (opened, input, file) = Opened::bytes(path, spool, limits, progress)?;
         let kind = sniff::sniff(&input).map_err(|rejection| rejection.at(path))?;
         let content = Content::of(kind, &input, &Context { path, spool, limits, progress })?;
-        let Content { source, format, findings, header, unit } = content;
-        Ok(Self { opened, name: path.to_owned(), file, input, source, format, findings, header, unit })
+        let Content { source, format, findings, header, unit, positions } = content;
+        Ok(Self { opened, name: path.to_owned(), file, input, source, format, findings, header, unit, positions })
     }
 
     /// The triangles in input order, those with NaN or infinite coordinates included.
@@ -179,6 +189,11 @@ impl MeshFile {
     /// The whole input as it stands on disk, for hashing and copying.
     pub fn bytes(&self) -> &[u8] {
         &self.input
+    }
+
+    /// The positions that its faces name by number, where it has one table of them.
+    pub(crate) fn vertices(&self) -> Option<Vertices<'_>> {
+        Some(self.positions.as_ref()?.vertices(&self.input))
     }
 
     /// The open file that holds the input, and the place in it where `part` of [`MeshFile::bytes`] or of the records lies, if it does: for copies that

@@ -13,7 +13,7 @@ use super::elements::text::{Behind, Read, Section};
 use super::elements::{points, polygons};
 use super::finding::{Finding, Rejection};
 use super::spool::{Context, Parsed};
-use super::vertices::Vertices;
+use super::vertices::{Positions, Vertices};
 use super::{binary, tail};
 use crate::contract::error::Result;
 use crate::util::words::{Count, Counted};
@@ -49,7 +49,8 @@ pub(super) fn read(bytes: &[u8], context: &Context<'_>) -> Result<Parsed> {
     } else {
         tail::behind_text(whole, zeros)
     });
-    Ok(Parsed { records: faces.map()?, findings, header: binary::header_of(b""), rounding: gathered.1, unit: None })
+    let (records, positions) = (faces.map()?, Some(Positions::Spooled(positions)));
+    Ok(Parsed { records, findings, header: binary::header_of(b""), rounding: gathered.1, unit: None, positions })
 }
 
 /// Whether `bytes` begin with a keyword of OFF, after blanks and comments.

@@ -251,6 +251,7 @@ pub(super) fn built(model: &Model, context: &Context<'_>) -> Result<Parsed> {
         header: binary::header_of(b""),
         rounding: rounding.if_any(),
         unit: Some(model.unit().name()),
+        positions: None,
     })
 }
 

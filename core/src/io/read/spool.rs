@@ -14,6 +14,7 @@ use rayon::prelude::*;
 use super::finding::{Finding, Rejection};
 use super::limits::{HEADER_BYTES, MAX_TRIANGLES};
 use super::rounding::Rounding;
+use super::vertices::Positions;
 use crate::contract::error::{Error, Result};
 use crate::contract::progress::Progress;
 use crate::contract::settings::Limits;
@@ -35,6 +36,8 @@ pub(crate) struct Parsed {
     pub(crate) rounding: Option<Rounding>,
     /// The name of the unit of all coordinates, where the file says one.
     pub(crate) unit: Option<&'static str>,
+    /// The positions that faces name by number, where the file has one table of them.
+    pub(crate) positions: Option<Positions>,
 }
 
 /// Paths, limits and progress of a reading.

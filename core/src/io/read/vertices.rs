@@ -1,5 +1,6 @@
 //! The positions that faces refer to, wherever they lie.
 
+use super::spool::{Items, POSITION_BYTES};
 use crate::io::record::Point;
 
 /// Positions at equal steps in bytes: in a spool of them, or in the file itself.
@@ -12,12 +13,12 @@ pub(crate) struct Vertices<'a> {
 
 impl<'a> Vertices<'a> {
     /// Those of a spool.
-    pub(crate) fn spooled(positions: &'a [[u8; super::spool::POSITION_BYTES]]) -> Self {
-        Self { bytes: positions.as_flattened(), stride: super::spool::POSITION_BYTES, count: positions.len() }
+    pub(crate) fn spooled(positions: &'a [[u8; POSITION_BYTES]]) -> Self {
+        Self { bytes: positions.as_flattened(), stride: POSITION_BYTES, count: positions.len() }
     }
 
     /// Those in a file: each stands at the beginning of `stride` bytes, as three little-endian `f32`.
-    pub(super) fn in_place(bytes: &'a [u8], stride: usize, count: usize) -> Self {
+    fn in_place(bytes: &'a [u8], stride: usize, count: usize) -> Self {
         Self { bytes, stride, count }
     }
 
@@ -36,10 +37,32 @@ impl<'a> Vertices<'a> {
     }
 }
 
+/// Where the positions of a file lie.
+#[derive(Debug)]
+pub(crate) enum Positions {
+    /// In the file: so many, the first from this byte on, each at the beginning of `stride` bytes.
+    InPlace {
+        from: usize,
+        stride: usize,
+        count: usize,
+    },
+    Spooled(Items<POSITION_BYTES>),
+}
+
+impl Positions {
+    /// Those of a file of these bytes.
+    pub(crate) fn vertices<'v>(&'v self, bytes: &'v [u8]) -> Vertices<'v> {
+        match self {
+            Self::InPlace { from, stride, count } => Vertices::in_place(bytes.get(*from..).unwrap_or_default(), *stride, *count),
+            Self::Spooled(items) => Vertices::spooled(items.all()),
+        }
+    }
+}
+
 /// A position as a spool holds it.
 #[inline]
-pub(super) fn packed(point: Point) -> [u8; super::spool::POSITION_BYTES] {
-    let mut bytes = [0; super::spool::POSITION_BYTES];
+pub(super) fn packed(point: Point) -> [u8; POSITION_BYTES] {
+    let mut bytes = [0; POSITION_BYTES];
     let (words, _) = bytes.as_chunks_mut::<4>();
     for (word, value) in words.iter_mut().zip(point) {
         *word = value.to_le_bytes();

@@ -20,8 +20,9 @@ use crate::io::record;
 use elements::Element;
 pub(crate) use elements::Elements;
 use inherit::Attribute;
-pub(crate) use plan::{Change, MeshText, Unit};
-use plan::{Fate, Plan, UnitPlan};
+pub(crate) use inherit::weights;
+pub(crate) use plan::{Change, Fate, MeshText, Unit};
+use plan::{Plan, UnitPlan};
 
 /// Bytes of text that are given on at once.
 const BATCH: usize = 256 << 10;
@@ -209,7 +210,7 @@ impl Writer<'_, '_> {
                 Fate::Part(of, corners) => {
                     let Some(element) = unit.parted.get(&of) else { return };
                     let came = change.came.get(of as usize).map(record::corners).unwrap_or_default();
-                    let inherited = inherit::part(element, corners.map(|corner| inherit::weights(came, corner)));
+                    let inherited = inherit::part(element, corners.map(|corner| weights(came, corner)));
                     if !element.attributes.is_empty() {
                         used.insert(of);
                         let count = if inherited.is_exact { &mut self.account.divided } else { &mut self.account.approximated };

@@ -89,7 +89,8 @@ pub(super) fn read(text: &[u8], context: &Context<'_>) -> Result<Parsed> {
     findings.extend(of_placement(&document, &names, &placed));
     let name = if document.name.is_empty() { &document.name_of_object } else { &document.name };
     let header = binary::header_of(name);
-    Ok(Parsed { records: placed.records, findings, header, rounding: placed.rounding.if_any(), unit: unit_of(&document) })
+    let (records, rounding) = (placed.records, placed.rounding.if_any());
+    Ok(Parsed { records, findings, header, rounding, unit: unit_of(&document), positions: None })
 }
 
 /// The name of the unit, if it is one of AMF's.

@@ -6,14 +6,14 @@ use crate::io::read::rounding::Rounding;
 
 /// What there is to say of the coordinates of a piece.
 #[derive(Clone, Copy, Debug, Default)]
-pub(in crate::io::read) struct Notes {
-    pub(in crate::io::read) rounding: Rounding,
+pub(in crate::io) struct Notes {
+    pub(in crate::io) rounding: Rounding,
     /// Coordinates that are no numbers, and read as NaN.
-    pub(in crate::io::read) damaged: u64,
+    pub(in crate::io) damaged: u64,
 }
 
 /// A place in a file, from which numbers are taken one after the other. `None`: there is none left.
-pub(in crate::io::read) trait Cursor {
+pub(in crate::io) trait Cursor {
     /// Passes over so many numbers, which are so many bytes in a binary file.
     fn skip(&mut self, values: usize, bytes: usize) -> Option<()>;
 
@@ -41,7 +41,7 @@ pub(in crate::io::read) trait Cursor {
 }
 
 /// Takes rows, piece by piece, by several threads.
-pub(in crate::io::read) trait Sink: Sync {
+pub(in crate::io) trait Sink: Sync {
     /// What becomes of a piece.
     type Made: Send;
 
@@ -53,7 +53,7 @@ pub(in crate::io::read) trait Sink: Sync {
 }
 
 /// Joins what became of the pieces, in their order.
-pub(in crate::io::read) trait Collector<M>: Send {
+pub(in crate::io) trait Collector<M>: Send {
     /// Appends what became of a piece.
     fn take(&mut self, made: M) -> Result<()>;
 
@@ -65,7 +65,7 @@ pub(in crate::io::read) trait Collector<M>: Send {
 }
 
 /// Passes over rows.
-pub(in crate::io::read) struct Passed<'l>(pub(in crate::io::read) &'l Layout);
+pub(in crate::io) struct Passed<'l>(pub(in crate::io) &'l Layout);
 
 impl Sink for Passed<'_> {
     type Made = ();

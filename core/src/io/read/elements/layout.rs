@@ -2,7 +2,7 @@
 
 /// A type of number in a binary file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(in crate::io::read) enum Scalar {
+pub(in crate::io) enum Scalar {
     I8,
     U8,
     I16,
@@ -15,7 +15,7 @@ pub(in crate::io::read) enum Scalar {
 
 impl Scalar {
     /// Bytes it takes.
-    pub(in crate::io::read) fn bytes(self) -> usize {
+    pub(in crate::io) fn bytes(self) -> usize {
         match self {
             Self::I8 | Self::U8 => 1,
             Self::I16 | Self::U16 => 2,
@@ -25,14 +25,14 @@ impl Scalar {
     }
 
     /// It may have a fraction.
-    pub(in crate::io::read) fn is_float(self) -> bool {
+    pub(in crate::io) fn is_float(self) -> bool {
         matches!(self, Self::F32 | Self::F64)
     }
 }
 
 /// A part of a row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(in crate::io::read) enum Step {
+pub(in crate::io) enum Step {
     /// Numbers that are passed over.
     Skip { values: usize, bytes: usize },
     /// A coordinate of a vertex: its axis and its type.
@@ -43,21 +43,21 @@ pub(in crate::io::read) enum Step {
 
 /// The parts of a row, in their order.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub(in crate::io::read) struct Layout {
+pub(in crate::io) struct Layout {
     steps: Vec<Step>,
 }
 
 /// A row of one list with a length of one byte: the bytes before the length, of each item, and behind the list.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(in crate::io::read) struct ShortList {
-    pub(in crate::io::read) before: usize,
-    pub(in crate::io::read) item: usize,
-    pub(in crate::io::read) behind: usize,
+pub(in crate::io) struct ShortList {
+    pub(in crate::io) before: usize,
+    pub(in crate::io) item: usize,
+    pub(in crate::io) behind: usize,
 }
 
 impl Layout {
     /// Appends a part; numbers to pass over are joined.
-    pub(in crate::io::read) fn push(&mut self, step: Step) {
+    pub(in crate::io) fn push(&mut self, step: Step) {
         match (self.steps.last_mut(), step) {
             (Some(Step::Skip { values, bytes }), Step::Skip { values: more, bytes: wider }) => {
                 *values += more;
@@ -68,12 +68,12 @@ impl Layout {
     }
 
     /// The parts.
-    pub(in crate::io::read) fn steps(&self) -> &[Step] {
+    pub(in crate::io) fn steps(&self) -> &[Step] {
         &self.steps
     }
 
     /// The fewest bytes of a row: with empty lists.
-    pub(in crate::io::read) fn least_bytes(&self) -> usize {
+    pub(in crate::io) fn least_bytes(&self) -> usize {
         let bytes = |step: &Step| match *step {
             Step::Skip { bytes, .. } => bytes,
             Step::Coordinate(_, kind) => kind.bytes(),
@@ -83,13 +83,13 @@ impl Layout {
     }
 
     /// The bytes of every row, if there are no lists.
-    pub(in crate::io::read) fn stride(&self) -> Option<usize> {
+    pub(in crate::io) fn stride(&self) -> Option<usize> {
         let lists = self.steps.iter().any(|step| matches!(step, Step::List { .. }));
         (!lists).then(|| self.least_bytes())
     }
 
     /// This as a row of one list with a length of one byte, if it is one.
-    pub(in crate::io::read) fn short_list(&self) -> Option<ShortList> {
+    pub(in crate::io) fn short_list(&self) -> Option<ShortList> {
         let (before, item, behind) = match *self.steps.as_slice() {
             [list] => (0, list, 0),
             [Step::Skip { bytes, .. }, list] => (bytes, list, 0),
@@ -102,7 +102,7 @@ impl Layout {
     }
 
     /// Where x, y and z stand in a row, if they are three little-endian `f32` side by side, as [`super::super::vertices::Vertices`] reads them.
-    pub(in crate::io::read) fn side_by_side(&self) -> Option<usize> {
+    pub(in crate::io) fn side_by_side(&self) -> Option<usize> {
         let mut at = 0;
         for (place, step) in self.steps.iter().enumerate() {
             match step {

@@ -12,19 +12,19 @@ pub(super) fn ends_line(byte: u8) -> bool {
 
 /// A place in a text.
 #[derive(Clone, Debug)]
-pub(in crate::io::read) struct Line<'a> {
-    pub(in crate::io::read) text: &'a [u8],
-    pub(in crate::io::read) at: usize,
+pub(in crate::io) struct Line<'a> {
+    pub(in crate::io) text: &'a [u8],
+    pub(in crate::io) at: usize,
     /// Tokens end with the line.
-    pub(in crate::io::read) within: bool,
+    pub(in crate::io) within: bool,
     /// `#` begins a comment, which ends with the line.
-    pub(in crate::io::read) comments: bool,
+    pub(in crate::io) comments: bool,
 }
 
 impl<'a> Line<'a> {
     /// The text from the next token on, if there is one: in this line, or at all.
     #[inline]
-    pub(in crate::io::read) fn token(&mut self) -> Option<&'a [u8]> {
+    pub(in crate::io) fn token(&mut self) -> Option<&'a [u8]> {
         loop {
             let rest = self.text.get(self.at..)?;
             match *rest.first()? {
@@ -38,9 +38,21 @@ impl<'a> Line<'a> {
 
     /// Goes to the end of the line.
     #[inline]
-    pub(in crate::io::read) fn skip_line(&mut self) {
+    pub(in crate::io) fn skip_line(&mut self) {
         let rest = self.text.get(self.at..).unwrap_or_default();
         self.at += rest.iter().position(|byte| ends_line(*byte)).unwrap_or(rest.len());
+    }
+
+    /// Goes behind the end of the line, unless a token stands before it.
+    pub(in crate::io) fn end(&mut self) {
+        let (before, within) = (self.at, std::mem::replace(&mut self.within, true));
+        if self.token().is_some() {
+            self.at = before;
+        } else {
+            let rest = self.text.get(self.at..).unwrap_or_default();
+            self.at += if rest.starts_with(b"\r\n") { 2 } else { rest.len().min(1) };
+        }
+        self.within = within;
     }
 
     /// Goes to the first token of the next line that has one, or to the end.
@@ -61,7 +73,7 @@ impl<'a> Line<'a> {
 
     /// A whole number.
     #[inline]
-    pub(in crate::io::read) fn whole(&mut self) -> Option<i64> {
+    pub(in crate::io) fn whole(&mut self) -> Option<i64> {
         let rest = self.token()?;
         let (mut value, mut digits) = (0_i64, 0);
         for byte in rest.iter().take(18) {

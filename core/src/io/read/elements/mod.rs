@@ -4,10 +4,10 @@
 //! **Out:** positions or records in their spools, how many rows were there, and where they end.
 //! **Promise:** memory for a few pieces of the file, whatever counts it claims; the same result for any number of threads.
 
-pub(super) mod cursor;
-pub(super) mod layout;
-pub(super) mod lines;
-pub(super) mod packed;
+pub(in crate::io) mod cursor;
+pub(in crate::io) mod layout;
+pub(in crate::io) mod lines;
+pub(in crate::io) mod packed;
 pub(super) mod points;
 pub(super) mod polygons;
 pub(super) mod strips;

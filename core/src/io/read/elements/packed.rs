@@ -15,9 +15,9 @@ const PIECES: usize = 4;
 
 /// A place among numbers, whose bytes begin with the highest where `BIG`.
 #[derive(Clone, Debug)]
-pub(in crate::io::read) struct Packed<'a, const BIG: bool> {
-    pub(in crate::io::read) bytes: &'a [u8],
-    pub(in crate::io::read) at: usize,
+pub(in crate::io) struct Packed<'a, const BIG: bool> {
+    pub(in crate::io) bytes: &'a [u8],
+    pub(in crate::io) at: usize,
 }
 
 impl<const BIG: bool> Packed<'_, BIG> {
@@ -91,28 +91,28 @@ impl<const BIG: bool> Cursor for Packed<'_, BIG> {
 
 /// A section of elements of one kind.
 #[derive(Clone, Copy, Debug)]
-pub(in crate::io::read) struct Section<'a, const BIG: bool> {
+pub(in crate::io) struct Section<'a, const BIG: bool> {
     /// The whole file.
-    pub(in crate::io::read) bytes: &'a [u8],
+    pub(in crate::io) bytes: &'a [u8],
     /// Where the section begins.
-    pub(in crate::io::read) from: usize,
+    pub(in crate::io) from: usize,
     /// So many are announced.
-    pub(in crate::io::read) rows: u64,
-    pub(in crate::io::read) layout: &'a Layout,
+    pub(in crate::io) rows: u64,
+    pub(in crate::io) layout: &'a Layout,
 }
 
 /// What was read of a section.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(in crate::io::read) struct Read {
+pub(in crate::io) struct Read {
     /// So many elements were there.
-    pub(in crate::io::read) rows: u64,
+    pub(in crate::io) rows: u64,
     /// Where the section, or what there is of it, ends.
-    pub(in crate::io::read) end: usize,
+    pub(in crate::io) end: usize,
 }
 
 impl<'a, const BIG: bool> Section<'a, BIG> {
     /// Where the section ends, without looking at its elements if they are all of one length. O(rows) else.
-    pub(in crate::io::read) fn pass(self) -> Read {
+    pub(in crate::io) fn pass(self) -> Read {
         let mut walk = Walk::new(self);
         match self.layout.stride() {
             Some(stride) => walk.stride(stride, self.rows),
@@ -125,7 +125,7 @@ impl<'a, const BIG: bool> Section<'a, BIG> {
     ///
     /// # Errors
     /// Those of `collector`, and [`crate::contract::error::Error::Io`] when the progress cancels.
-    pub(in crate::io::read) fn read<S: Sink>(
+    pub(in crate::io) fn read<S: Sink>(
         self,
         context: &Context<'_>,
         sink: &S,

@@ -10,7 +10,7 @@ use crate::io::read::vertices::packed;
 use crate::util::words::{Count, Counted};
 
 /// Positions of a piece.
-pub(in crate::io::read) struct Made {
+pub(in crate::io) struct Made {
     positions: Vec<[u8; POSITION_BYTES]>,
     notes: Notes,
     /// Vertices with a coordinate that is no number or not there, and the first of them in this piece, from 1.
@@ -19,7 +19,7 @@ pub(in crate::io::read) struct Made {
 }
 
 /// Takes rows of this layout for vertices.
-pub(in crate::io::read) struct Points<'l>(pub(in crate::io::read) &'l Layout);
+pub(in crate::io) struct Points<'l>(pub(in crate::io) &'l Layout);
 
 impl Points<'_> {
     #[inline]
@@ -60,7 +60,7 @@ impl Sink for Points<'_> {
 }
 
 /// All positions of a file.
-pub(in crate::io::read) struct Gathered<'a> {
+pub(in crate::io) struct Gathered<'a> {
     spool: Spool<'a, POSITION_BYTES>,
     rounding: Rounding,
     damaged: u64,
@@ -69,18 +69,18 @@ pub(in crate::io::read) struct Gathered<'a> {
 
 impl<'a> Gathered<'a> {
     /// None so far, and room for so many.
-    pub(in crate::io::read) fn new(context: &Context<'a>, expected: u64) -> Result<Self> {
+    pub(in crate::io) fn new(context: &Context<'a>, expected: u64) -> Result<Self> {
         context.make_room(expected.saturating_mul(POSITION_BYTES as u64), "the positions of the vertices")?;
         Ok(Self { spool: context.positions()?, rounding: Rounding::default(), damaged: 0, first: None })
     }
 
     /// How far they were rounded, if they were.
-    pub(in crate::io::read) fn rounding(&self) -> Option<Rounding> {
+    pub(in crate::io) fn rounding(&self) -> Option<Rounding> {
         self.rounding.if_any()
     }
 
     /// Refuses positions that are damaged for the most part.
-    pub(in crate::io::read) fn judge(&self) -> std::result::Result<(), Rejection> {
+    pub(in crate::io) fn judge(&self) -> std::result::Result<(), Rejection> {
         let all = self.spool.count();
         if self.damaged > all / 2 {
             let all = Counted(all, "vertex has", "vertices have");
@@ -91,7 +91,7 @@ impl<'a> Gathered<'a> {
     }
 
     /// What is odd about them.
-    pub(in crate::io::read) fn findings(&self) -> Vec<Finding> {
+    pub(in crate::io) fn findings(&self) -> Vec<Finding> {
         let damaged = (self.damaged > 0).then(|| {
             let vertices = Counted(self.damaged, "vertex", "vertices");
             let first = Count(self.first.unwrap_or_default());
@@ -102,7 +102,7 @@ impl<'a> Gathered<'a> {
     }
 
     /// The positions, mapped.
-    pub(in crate::io::read) fn map(self) -> Result<Items<POSITION_BYTES>> {
+    pub(in crate::io) fn map(self) -> Result<Items<POSITION_BYTES>> {
         self.spool.map()
     }
 }

@@ -8,7 +8,7 @@ use crate::io::read::spool::{Context, Items, Spool};
 use crate::io::read::vertices::Vertices;
 
 /// Faces of a piece.
-pub(in crate::io::read) struct Made<'v> {
+pub(in crate::io) struct Made<'v> {
     pub(super) faces: Faces<'v>,
     indices: Vec<u64>,
 }
@@ -46,9 +46,9 @@ impl<'v> Made<'v> {
 }
 
 /// Takes rows of this layout for faces of these vertices.
-pub(in crate::io::read) struct Polygons<'l, 'v> {
-    pub(in crate::io::read) layout: &'l Layout,
-    pub(in crate::io::read) vertices: Vertices<'v>,
+pub(in crate::io) struct Polygons<'l, 'v> {
+    pub(in crate::io) layout: &'l Layout,
+    pub(in crate::io) vertices: Vertices<'v>,
 }
 
 impl<'v> Sink for Polygons<'_, 'v> {
@@ -77,7 +77,7 @@ impl<'v> Sink for Polygons<'_, 'v> {
 }
 
 /// All faces of a file.
-pub(in crate::io::read) struct Gathered<'a> {
+pub(in crate::io) struct Gathered<'a> {
     spool: Spool<'a, 50>,
     tally: Tally,
     /// What there was when it was told to keep it.
@@ -86,23 +86,23 @@ pub(in crate::io::read) struct Gathered<'a> {
 
 impl<'a> Gathered<'a> {
     /// None so far, and room for so many.
-    pub(in crate::io::read) fn new(context: &Context<'a>, expected: u64) -> Result<Self> {
+    pub(in crate::io) fn new(context: &Context<'a>, expected: u64) -> Result<Self> {
         context.make_room(expected.saturating_mul(50), "the triangles of the faces")?;
         Ok(Self { spool: context.records()?, tally: Tally::default(), kept: (0, Tally::default()) })
     }
 
     /// The counts of all faces.
-    pub(in crate::io::read) fn tally(&self) -> &Tally {
+    pub(in crate::io) fn tally(&self) -> &Tally {
         &self.tally
     }
 
     /// So many triangles.
-    pub(in crate::io::read) fn triangles(&self) -> u64 {
+    pub(in crate::io) fn triangles(&self) -> u64 {
         self.spool.count()
     }
 
     /// The triangles, mapped.
-    pub(in crate::io::read) fn map(self) -> Result<Items<50>> {
+    pub(in crate::io) fn map(self) -> Result<Items<50>> {
         self.spool.map()
     }
 }

@@ -15,7 +15,7 @@ const AT_ONCE: usize = 64 << 10;
 ///
 /// # Errors
 /// Those of `collector`.
-pub(in crate::io::read) fn take<'v>(
+pub(in crate::io) fn take<'v>(
     rows: u64,
     layout: &Layout,
     vertices: Vertices<'v>,

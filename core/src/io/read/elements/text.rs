@@ -22,7 +22,7 @@ const AT_ONCE: u64 = 32 << 10;
 
 /// Whether more numbers may stand behind an element, until the line ends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(in crate::io::read) enum Behind {
+pub(in crate::io) enum Behind {
     Nothing,
     /// Where each element has a line of its own.
     IfLines,
@@ -31,27 +31,27 @@ pub(in crate::io::read) enum Behind {
 
 /// A section of elements of one kind.
 #[derive(Clone, Copy, Debug)]
-pub(in crate::io::read) struct Section<'a> {
+pub(in crate::io) struct Section<'a> {
     /// The whole text.
-    pub(in crate::io::read) text: &'a [u8],
+    pub(in crate::io) text: &'a [u8],
     /// Where the section begins.
-    pub(in crate::io::read) from: usize,
+    pub(in crate::io) from: usize,
     /// So many are announced.
-    pub(in crate::io::read) rows: u64,
+    pub(in crate::io) rows: u64,
     /// `#` begins a comment.
-    pub(in crate::io::read) comments: bool,
-    pub(in crate::io::read) behind: Behind,
+    pub(in crate::io) comments: bool,
+    pub(in crate::io) behind: Behind,
 }
 
 /// What was read of a section.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(in crate::io::read) struct Read {
+pub(in crate::io) struct Read {
     /// So many elements were there.
-    pub(in crate::io::read) rows: u64,
+    pub(in crate::io) rows: u64,
     /// Those on a line with other numbers than an element has.
-    pub(in crate::io::read) bent: u64,
+    pub(in crate::io) bent: u64,
     /// Where the section ends.
-    pub(in crate::io::read) end: usize,
+    pub(in crate::io) end: usize,
 }
 
 impl From<packed::Read> for Read {
@@ -65,7 +65,7 @@ impl<'a> Section<'a> {
     ///
     /// # Errors
     /// Those of `collector`, and [`crate::contract::error::Error::Io`] when the progress cancels.
-    pub(in crate::io::read) fn read<S: Sink>(
+    pub(in crate::io) fn read<S: Sink>(
         self,
         context: &Context<'_>,
         lines: &S,

@@ -4,9 +4,9 @@ use super::super::number::{self, Number, is_blank};
 
 /// A place in a text.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Cursor<'a> {
+pub(in crate::io) struct Cursor<'a> {
     text: &'a [u8],
-    pub(super) at: usize,
+    pub(in crate::io) at: usize,
 }
 
 #[inline(always)]
@@ -25,7 +25,7 @@ fn line_end(text: &[u8], at: usize) -> usize {
 }
 
 /// The first place behind `from`, and not beyond `until`, where a line begins that is not joined with the one before.
-pub(super) fn next_line(text: &[u8], from: usize, until: usize) -> Option<usize> {
+pub(in crate::io) fn next_line(text: &[u8], from: usize, until: usize) -> Option<usize> {
     let mut at = from;
     loop {
         at += text.get(at..until.min(text.len()))?.iter().position(|&byte| is_line_end(byte))?;
@@ -39,13 +39,13 @@ pub(super) fn next_line(text: &[u8], from: usize, until: usize) -> Option<usize>
 
 impl<'a> Cursor<'a> {
     /// At the beginning of a text.
-    pub(super) fn of(text: &'a [u8]) -> Self {
+    pub(in crate::io) fn of(text: &'a [u8]) -> Self {
         Self { text, at: 0 }
     }
 
     /// Goes to the keyword of the next line that is neither empty nor a comment, and behind it.
     #[inline]
-    pub(super) fn keyword(&mut self) -> Option<&'a [u8]> {
+    pub(in crate::io) fn keyword(&mut self) -> Option<&'a [u8]> {
         loop {
             let rest = self.text.get(self.at..)?;
             self.at += rest.iter().position(|&byte| !is_blank(byte))?;
@@ -73,7 +73,7 @@ impl<'a> Cursor<'a> {
 
     /// Goes to the next word of this line; `false` at its end.
     #[inline]
-    pub(super) fn is_at_word(&mut self) -> bool {
+    pub(in crate::io) fn is_at_word(&mut self) -> bool {
         loop {
             match self.text.get(self.at) {
                 None | Some(b'\n' | b'\r' | b'#') => return false,
@@ -87,9 +87,14 @@ impl<'a> Cursor<'a> {
         }
     }
 
+    /// The next word of this line, which it goes behind.
+    pub(in crate::io) fn word(&mut self) -> Option<&'a [u8]> {
+        self.is_at_word().then(|| self.rest_of_word())
+    }
+
     /// The next word of this line as a number, which it goes behind; `Some(None)` for a word that is none.
     #[inline]
-    pub(super) fn number(&mut self) -> Option<Option<(Number, &'a [u8])>> {
+    pub(in crate::io::read) fn number(&mut self) -> Option<Option<(Number, &'a [u8])>> {
         if !self.is_at_word() {
             return None;
         }
@@ -104,7 +109,7 @@ impl<'a> Cursor<'a> {
 
     /// The next word of this line as the index of a vertex, which may have others behind slashes; `Some(None)` for a word that is none.
     #[inline]
-    pub(super) fn index(&mut self) -> Option<Option<i64>> {
+    pub(in crate::io) fn index(&mut self) -> Option<Option<i64>> {
         if !self.is_at_word() {
             return None;
         }
@@ -126,7 +131,7 @@ impl<'a> Cursor<'a> {
     }
 
     /// The rest of this line as a name.
-    pub(super) fn name(&mut self) -> &'a [u8] {
+    pub(in crate::io) fn name(&mut self) -> &'a [u8] {
         let rest = self.text.get(self.at..).unwrap_or_default();
         let length = rest.iter().position(|&byte| is_line_end(byte)).unwrap_or(rest.len());
         let name = rest.get(..length).unwrap_or_default();
@@ -137,7 +142,7 @@ impl<'a> Cursor<'a> {
 
     /// Goes to the end of this line, and of those that are joined with it.
     #[inline]
-    pub(super) fn skip_line(&mut self) {
+    pub(in crate::io) fn skip_line(&mut self) {
         loop {
             let rest = self.text.get(self.at..).unwrap_or_default();
             let length = rest.iter().position(|&byte| is_line_end(byte)).unwrap_or(rest.len());
@@ -149,13 +154,19 @@ impl<'a> Cursor<'a> {
         }
     }
 
+    /// Goes behind the end of the line that ends here.
+    pub(in crate::io) fn end(&mut self) {
+        self.skip_line();
+        self.at += line_end(self.text, self.at);
+    }
+
     /// The text ends here, and within a line.
-    pub(super) fn is_at_end(&self) -> bool {
+    pub(in crate::io) fn is_at_end(&self) -> bool {
         self.at >= self.text.len()
     }
 
     /// The text from `begin` up to here.
-    pub(super) fn since(&self, begin: usize) -> &'a [u8] {
+    pub(in crate::io) fn since(&self, begin: usize) -> &'a [u8] {
         self.text.get(begin..self.at).unwrap_or_default()
     }
 }

@@ -9,9 +9,9 @@
 //! before each window, then the faces, which may refer to vertices behind them. Memory: the windows being parsed, and positions that the system can
 //! drop at any time.
 
-mod line;
+pub(in crate::io) mod line;
 mod surfaces;
-mod survey;
+pub(in crate::io) mod survey;
 #[cfg(test)]
 mod tests;
 
@@ -21,7 +21,7 @@ use super::finding::{Finding, Rejection};
 use super::foreign;
 use super::number::{COMMA, POINT};
 use super::spool::{Context, POSITION_BYTES, Parsed};
-use super::vertices::Vertices;
+use super::vertices::{Positions, Vertices};
 use crate::contract::error::Result;
 use crate::io::record::Record;
 use crate::util::words::{Count, Counted};
@@ -123,7 +123,9 @@ pub(super) fn read(bytes: &[u8], start: usize, context: &Context<'_>) -> Result<
     }
     let mut findings = findings(bytes, &found, cut_off);
     findings.extend(tally.findings());
-    Ok(Parsed { records: records.map()?, findings, header: header(&found), rounding: found.rounding.if_any(), unit: None })
+    let (header, rounding) = (header(&found), found.rounding.if_any());
+    let positions = Some(Positions::Spooled(positions));
+    Ok(Parsed { records: records.map()?, findings, header, rounding, unit: None, positions })
 }
 
 fn windows_at_a_time() -> usize {

@@ -68,7 +68,7 @@ impl Survey {
 
 /// A statement by its keyword.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Statement {
+pub(in crate::io) enum Statement {
     Vertex,
     Face,
     Point,
@@ -84,7 +84,7 @@ pub(super) enum Statement {
 impl Statement {
     /// The statement that a keyword begins.
     #[inline]
-    pub(super) fn of(keyword: &[u8]) -> Self {
+    pub(in crate::io) fn of(keyword: &[u8]) -> Self {
         match keyword {
             b"v" => Self::Vertex,
             b"vt" | b"vn" => Self::Other,

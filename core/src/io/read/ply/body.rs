@@ -9,7 +9,7 @@ use crate::io::read::elements::packed::{self, Packed};
 use crate::io::read::elements::text::{self, Behind};
 use crate::io::read::elements::{points, polygons, strips};
 use crate::io::read::spool::Context;
-use crate::io::read::vertices::Vertices;
+use crate::io::read::vertices::{Positions, Vertices};
 use crate::util::words::Counted;
 
 /// What was read of an element: so many rows, those on lines with other numbers than theirs, and where it ends.
@@ -60,14 +60,14 @@ impl<'a> Body<'a> {
     }
 
     /// The vertices there, if they can stay where they are.
-    pub(super) fn vertices_in_place(self, from: usize, part: &Part) -> Option<(Vertices<'a>, Read)> {
+    pub(super) fn vertices_in_place(self, from: usize, part: &Part) -> Option<(Positions, Read)> {
         let (stride, offset) = (part.layout.stride()?, part.layout.side_by_side()?);
         if self.form != Form::Little {
             return None;
         }
         let read = self.packed::<false>(from, part).pass();
-        let bytes = self.bytes.get(from + offset..read.end).unwrap_or_default();
-        Some((Vertices::in_place(bytes, stride, usize::try_from(read.rows).ok()?), read.into()))
+        let count = usize::try_from(read.rows).ok()?;
+        Some((Positions::InPlace { from: from + offset, stride, count }, read.into()))
     }
 
     /// Reads the vertices there.

@@ -9,7 +9,7 @@ const LONGEST: usize = 1 << 20;
 
 /// The numbers behind the header.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Form {
+pub(in crate::io) enum Form {
     Text,
     Little,
     Big,
@@ -17,36 +17,36 @@ pub(super) enum Form {
 
 /// A property of an element.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct Property {
-    pub(super) name: Vec<u8>,
+pub(in crate::io) struct Property {
+    pub(in crate::io) name: Vec<u8>,
     /// Of a list: that of its length.
-    pub(super) list: Option<Scalar>,
-    pub(super) kind: Scalar,
+    pub(in crate::io) list: Option<Scalar>,
+    pub(in crate::io) kind: Scalar,
 }
 
 /// Elements of one kind.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct Element {
-    pub(super) name: Vec<u8>,
-    pub(super) count: u64,
-    pub(super) properties: Vec<Property>,
+pub(in crate::io) struct Element {
+    pub(in crate::io) name: Vec<u8>,
+    pub(in crate::io) count: u64,
+    pub(in crate::io) properties: Vec<Property>,
 }
 
 /// A header.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct Header {
-    pub(super) form: Form,
-    pub(super) elements: Vec<Element>,
+pub(in crate::io) struct Header {
+    pub(in crate::io) form: Form,
+    pub(in crate::io) elements: Vec<Element>,
     /// Where the elements begin.
-    pub(super) end: usize,
-    pub(super) findings: Vec<Finding>,
+    pub(in crate::io) end: usize,
+    pub(in crate::io) findings: Vec<Finding>,
 }
 
 /// Reads the header at the beginning of `bytes`.
 ///
 /// # Errors
 /// [`Rejection::Unreadable`], with the number of the line that is no PLY.
-pub(super) fn read(bytes: &[u8]) -> Result<Header, Rejection> {
+pub(in crate::io) fn read(bytes: &[u8]) -> Result<Header, Rejection> {
     let mut lines = Lines::new(bytes);
     let (mut form, mut findings, mut elements) = (None, Vec::new(), Vec::<Element>::new());
     // The first is `ply`, by which the format was told.

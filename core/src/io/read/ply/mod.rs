@@ -7,8 +7,8 @@
 //! G. Turk, "The PLY Polygon File Format", Stanford 1994; strips as VTK and Stanford write them.
 
 mod body;
-mod header;
-mod roles;
+pub(in crate::io) mod header;
+pub(in crate::io) mod roles;
 #[cfg(test)]
 mod tests;
 
@@ -17,8 +17,8 @@ use self::header::Form;
 use self::roles::{Part, Role};
 use super::elements::{points, polygons};
 use super::finding::{Finding, Rejection};
-use super::spool::{Context, Items, POSITION_BYTES, Parsed};
-use super::vertices::Vertices;
+use super::spool::{Context, Parsed};
+use super::vertices::{Positions, Vertices};
 use super::{binary, tail};
 use crate::contract::error::Result;
 use crate::util::words::Count;
@@ -42,36 +42,23 @@ pub(super) fn read(bytes: &[u8], context: &Context<'_>) -> Result<Parsed> {
         parts = rest;
     }
     let Some((vertices, behind)) = parts.split_first() else { return Err(reject(binary::no_triangles())) };
-    let positions = reading.vertices(vertices)?;
+    let gathered = reading.vertices(vertices)?;
+    let positions = gathered.positions.vertices(bytes);
     let mut faces = polygons::Gathered::new(context, reading.expected(&faces_before, behind))?;
     for (part, from) in faces_before {
-        reading.faces_at(from, part, positions.vertices(), &mut faces)?;
+        reading.faces_at(from, part, positions, &mut faces)?;
     }
     for part in behind {
-        reading.faces(part, positions.vertices(), &mut faces)?;
+        reading.faces(part, positions, &mut faces)?;
     }
-    reading.finish(positions, faces, zeros)
+    reading.finish(gathered, faces, zeros)
 }
 
-/// The positions of a file.
-struct Positions<'a> {
-    place: Place<'a>,
-    gathered: Vec<Finding>,
+/// The vertices of a file.
+struct Gathered {
+    positions: Positions,
+    findings: Vec<Finding>,
     rounding: Option<super::rounding::Rounding>,
-}
-
-enum Place<'a> {
-    InFile(Vertices<'a>),
-    Spooled(Items<POSITION_BYTES>),
-}
-
-impl Positions<'_> {
-    fn vertices(&self) -> Vertices<'_> {
-        match &self.place {
-            Place::InFile(vertices) => *vertices,
-            Place::Spooled(items) => Vertices::spooled(items.all()),
-        }
-    }
 }
 
 /// A reading, and where it stands.
@@ -115,13 +102,13 @@ impl<'a> Reading<'a, '_> {
         }
     }
 
-    fn vertices(&mut self, part: &Part) -> Result<Positions<'a>> {
-        if let Some((vertices, read)) = self.body.vertices_in_place(self.at, part) {
+    fn vertices(&mut self, part: &Part) -> Result<Gathered> {
+        if let Some((positions, read)) = self.body.vertices_in_place(self.at, part) {
             self.at = read.end;
             if read.rows < part.count {
                 self.cut(part, read.rows);
             }
-            return Ok(Positions { place: Place::InFile(vertices), gathered: Vec::new(), rounding: None });
+            return Ok(Gathered { positions, findings: Vec::new(), rounding: None });
         }
         let mut gathered = points::Gathered::new(self.context, self.body.most_rows(self.at, part))?;
         let read = self.body.points(self.context, self.at, part, &mut gathered)?;
@@ -132,7 +119,7 @@ impl<'a> Reading<'a, '_> {
         self.lines_fit(read)?;
         gathered.judge().map_err(|rejection| rejection.at(self.context.path))?;
         let (findings, rounding) = (gathered.findings(), gathered.rounding());
-        Ok(Positions { place: Place::Spooled(gathered.map()?), gathered: findings, rounding })
+        Ok(Gathered { positions: Positions::Spooled(gathered.map()?), findings, rounding })
     }
 
     /// Refuses an element most of whose lines have other numbers than theirs.
@@ -187,7 +174,7 @@ impl<'a> Reading<'a, '_> {
         Ok(read)
     }
 
-    fn finish(mut self, positions: Positions<'_>, faces: polygons::Gathered<'_>, zeros: usize) -> Result<Parsed> {
+    fn finish(mut self, vertices: Gathered, faces: polygons::Gathered<'_>, zeros: usize) -> Result<Parsed> {
         let reject = |rejection: Rejection| rejection.at(self.context.path);
         let tally = *faces.tally();
         if faces.triangles() == 0 && self.cut {
@@ -197,7 +184,8 @@ impl<'a> Reading<'a, '_> {
         if faces.triangles() == 0 {
             return Err(reject(binary::no_triangles()));
         }
-        self.findings.extend(positions.gathered);
+        let Gathered { positions, findings, rounding } = vertices;
+        self.findings.extend(findings);
         if self.bent > 0 {
             let text = format!("{} lines with more or fewer numbers than the header announces", Count(self.bent));
             self.findings.push(Finding::loss(text));
@@ -210,6 +198,7 @@ impl<'a> Reading<'a, '_> {
             self.findings.push(Finding { harmless: true, ..Finding::flaw(text) });
         }
         let header = binary::header_of(b"");
-        Ok(Parsed { records: faces.map()?, findings: self.findings, header, rounding: positions.rounding, unit: None })
+        let records = faces.map()?;
+        Ok(Parsed { records, findings: self.findings, header, rounding, unit: None, positions: Some(positions) })
     }
 }

@@ -7,7 +7,7 @@ use crate::util::words::Counted;
 
 /// What is read of an element.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Role {
+pub(in crate::io) enum Role {
     Vertices,
     Faces,
     Strips,
@@ -16,17 +16,17 @@ pub(super) enum Role {
 
 /// An element with its role.
 #[derive(Debug)]
-pub(super) struct Part {
-    pub(super) role: Role,
-    pub(super) count: u64,
-    pub(super) layout: Layout,
+pub(in crate::io) struct Part {
+    pub(in crate::io) role: Role,
+    pub(in crate::io) count: u64,
+    pub(in crate::io) layout: Layout,
 }
 
 /// The elements with their roles, in the file's order.
 ///
 /// # Errors
 /// [`Rejection::Unreadable`] for what is no mesh: no vertices with coordinates, or no faces with indices.
-pub(super) fn of(header: &Header) -> Result<Vec<Part>, Rejection> {
+pub(in crate::io) fn of(header: &Header) -> Result<Vec<Part>, Rejection> {
     let parts: Vec<Part> = header.elements.iter().map(part).collect::<Result<_, _>>()?;
     let mut vertices = parts.iter().filter(|part| part.role == Role::Vertices);
     let refuse = |reason: &str| Err(Rejection::Unreadable(format!("a PLY model {reason}")));

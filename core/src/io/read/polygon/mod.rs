@@ -23,7 +23,7 @@ use crate::io::record::Point;
 ///
 /// A convex polygon becomes a fan from its first corner, as most readers have it. O(n log n) for the polygons of real files; at most about
 /// 64 n log n steps, or 2^26, for any, and 128 bytes per corner.
-pub(super) fn cut(polygon: &[Point], mut take: impl FnMut([usize; 3])) {
+pub(crate) fn cut(polygon: &[Point], mut take: impl FnMut([usize; 3])) {
     match Plane::of(polygon) {
         Some(plane) if polygon.len() > 3 => match *polygon {
             [a, b, c, d] => quad([a, b, c, d].map(|corner| plane.flat(corner))).into_iter().for_each(take),

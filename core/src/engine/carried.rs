@@ -1,0 +1,116 @@
+//! What a file says besides positions and faces, on its way into the result.
+
+use std::path::Path;
+
+use super::files::{self, Made};
+use crate::contract::error::{Error, Result};
+use crate::contract::progress::Progress;
+use crate::contract::report::{AttributesKept, Outcome, Report};
+use crate::contract::settings::{KeepAttributes, Limits, Profile};
+use crate::geometry::position;
+use crate::io::read::MeshFile;
+use crate::io::rows::Said;
+use crate::io::write_behind::WriteBehind;
+use crate::output::emit;
+use crate::output::model::{Account, Change};
+use crate::output::rows::Planned;
+use crate::util::words;
+
+/// The fate of what a file says, where it says anything. `planned`: it is written into the file's own rows.
+pub(crate) fn account(said: &Said<'_>, planned: Option<&Planned<'_>>, triangles: usize) -> Option<Account> {
+    match (said, planned) {
+        (Said::Nothing, _) => None,
+        (_, Some(planned)) => Some(planned.account),
+        (_, None) => Some(Account { lost: triangles as u64, ..Account::default() }),
+    }
+}
+
+/// How the file is written in its own rows, where it can be.
+pub(crate) fn plan<'p>(said: &'p Said<'_>, made: &'p Made) -> Option<Planned<'p>> {
+    let Said::Rows(rows) = said else { return None };
+    Planned::of(&**rows, Change { came: made.mesh.as_it_came(), now: made.mesh.records(), edit: &made.edit })
+}
+
+/// Does what the profile says of attributes that are lost or only about right: `harm` names them. `false`: nothing is to be written.
+pub(crate) fn heed(report: &mut Report, profile: &Profile, harm: Option<String>) -> bool {
+    let Some(harm) = harm else { return true };
+    match profile.attributes {
+        KeepAttributes::Refuse => {
+            report.outcome = Outcome::NotGood;
+            report.verdict.good = false;
+            report.verdict.reasons.insert(0, format!("{harm}: the profile `{}` refuses that", profile.name));
+            (report.output, report.certificate) = (None, None);
+            return false;
+        }
+        KeepAttributes::Keep if report.outcome.is_good() => {
+            report.outcome = Outcome::NeedsReview;
+            report.verdict.reasons.insert(0, harm);
+        }
+        KeepAttributes::Keep | KeepAttributes::Best => {}
+    }
+    true
+}
+
+/// The harm that an account tells of.
+pub(crate) fn harm(account: Account) -> Option<String> {
+    let harmed = account.lost + account.approximated;
+    let words = || format!("colours, paint or other attributes of {} are lost or only about right", words::triangles(harmed));
+    (harmed > 0).then(words)
+}
+
+/// Writes the new file `output`, and opens it.
+///
+/// # Errors
+/// [`Error::Io`], cancellation among them.
+pub(crate) fn write(planned: &Planned<'_>, output: &Path, limits: &Limits, progress: &dyn Progress) -> Result<MeshFile> {
+    let file = emit::create(output).map_err(Error::io(output, "creating"))?;
+    let behind = WriteBehind::new(&file, limits).map_err(Error::io(output, "creating"))?;
+    planned.write(&mut |bytes| {
+        if progress.cancelled() {
+            return Err(Error::cancelled(output, "writing"));
+        }
+        behind.append(bytes).map_err(Error::io(output, "writing"))
+    })?;
+    behind.finish().map_err(Error::io(output, "syncing"))?;
+    if !limits.defer_sync {
+        file.sync_all().map_err(Error::io(output, "syncing"))?;
+    }
+    files::open(output, limits, progress)
+}
+
+/// Does the written file hold the triangles of `result`, in its own order? O(n).
+///
+/// # Errors
+/// [`Error::Io`] if not.
+pub(crate) fn confirm(planned: &Planned<'_>, result: &MeshFile, written: &MeshFile) -> Result<()> {
+    let mut rest = written.records();
+    let mut holds = written.is_flawless();
+    for range in planned.order() {
+        let made = result.records().get(range.start as usize..range.end as usize).unwrap_or_default();
+        let Some((there, behind)) = rest.split_at_checked(made.len()).filter(|_| holds) else {
+            holds = false;
+            break;
+        };
+        rest = behind;
+        holds = made
+            .iter()
+            .zip(there)
+            .all(|(a, b)| position::corners(a).map(position::bits) == position::corners(b).map(position::bits));
+    }
+    if holds && rest.is_empty() && written.records().len() == result.records().len() {
+        return Ok(());
+    }
+    let source = std::io::Error::other("the file does not hold what was written to it");
+    Err(Error::io(written.path(), "reading back")(source))
+}
+
+impl Account {
+    /// For the report.
+    pub(crate) fn told(self) -> AttributesKept {
+        let Self { kept, divided, approximated, inherited, lost } = self;
+        AttributesKept { kept, divided, approximated, inherited, lost }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -177,11 +177,11 @@ fn read_ply(bytes: &[u8]) -> Vec<(Vec<Point>, Vec<[f32; 2]>, u8, f32)> {
         }
         own
     };
-    let mut float = |text: &mut std::str::SplitWhitespace<'_>, take: &mut dyn FnMut(usize) -> [u8; 4]| match form {
+    let float = |text: &mut std::str::SplitWhitespace<'_>, take: &mut dyn FnMut(usize) -> [u8; 4]| match form {
         Form::Text => text.next().unwrap().parse().unwrap(),
         _ => f32::from_le_bytes(take(4)),
     };
-    let mut whole = |text: &mut std::str::SplitWhitespace<'_>, take: &mut dyn FnMut(usize) -> [u8; 4], length| match form {
+    let whole = |text: &mut std::str::SplitWhitespace<'_>, take: &mut dyn FnMut(usize) -> [u8; 4], length| match form {
         Form::Text => text.next().unwrap().parse().unwrap(),
         _ => u32::from_le_bytes(take(length)),
     };
@@ -367,6 +367,31 @@ fn torus() -> Vec<Corners> {
     };
     let squares = (0..12).flat_map(|i| (0..8).map(move |j| [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)]));
     squares.flat_map(|[a, b, c, d]| [[a, b, c], [a, c, d]]).collect()
+}
+
+/// Nothing writes colours into an AMF: so the report says that they are lost.
+#[test]
+fn an_amf_says_that_colours_are_lost() {
+    let Mesh { points, faces } = Mesh::of(&cube()[1..]);
+    let vertex = |[x, y, z]: &Point| format!("<vertex><coordinates><x>{x}</x><y>{y}</y><z>{z}</z></coordinates></vertex>");
+    let triangle =
+        |face: &Vec<usize>| format!("<triangle><v1>{}</v1><v2>{}</v2><v3>{}</v3></triangle>", face[0], face[1], face[2]);
+    let (vertices, triangles): (String, String) = (points.iter().map(vertex).collect(), faces.iter().map(triangle).collect());
+    let plain =
+        format!("<amf><object id=\"0\"><mesh><vertices>{vertices}</vertices><volume>{triangles}</volume></mesh></object></amf>");
+    let colour = "<color><r>1</r><g>0</g><b>0</b></color>";
+    assert_eq!(repaired("amf", plain.as_bytes(), &Profile::default()).report.attributes, None);
+    for (before, after) in [
+        ("<volume>", format!("<volume materialid=\"2\">")),
+        ("<volume>", format!("<volume>{colour}")),
+        ("<object id", format!("<material id=\"2\">{colour}</material><object id")),
+        ("</vertex>", format!("{colour}</vertex>")),
+        ("</triangle>", format!("<texmap rtexid=\"1\"><utex1>0</utex1></texmap></triangle>")),
+    ] {
+        let text = plain.replacen(before, &after, 1);
+        let attributes = repaired("amf", text.as_bytes(), &Profile::default()).report.attributes;
+        assert_eq!(attributes.map(|attributes| attributes.lost), Some(11), "{text}");
+    }
 }
 
 proptest! {

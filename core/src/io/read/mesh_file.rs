@@ -43,6 +43,7 @@ pub struct MeshFile {
     header: [u8; HEADER_BYTES],
     unit: Option<&'static str>,
     positions: Option<Positions>,
+    coloured: bool,
 }
 
 /// What the bytes of a file hold.
@@ -53,6 +54,7 @@ struct Content {
     header: [u8; HEADER_BYTES],
     unit: Option<&'static str>,
     positions: Option<Positions>,
+    coloured: bool,
 }
 
 impl Content {
@@ -68,6 +70,7 @@ impl Content {
                     header,
                     unit: None,
                     positions: None,
+                    coloured: false,
                 })
             }
             sniff::Kind::Text(sniff::Text { start, mut findings }) => {
@@ -107,9 +110,9 @@ impl Content {
 
     /// `findings`: those of the bytes themselves.
     fn parsed(parsed: Parsed, format: Format, findings: Vec<Finding>) -> Self {
-        let Parsed { records, findings: mut found, header, rounding, unit, positions } = parsed;
+        let Parsed { records, findings: mut found, header, rounding, unit, positions, coloured } = parsed;
         found.extend(rounding.map(Rounding::finding));
-        Self { source: Source::Spooled(records), format, findings: [findings, found].concat(), header, unit, positions }
+        Self { source: Source::Spooled(records), format, findings: [findings, found].concat(), header, unit, positions, coloured }
     }
 }
 
@@ -126,8 +129,8 @@ impl MeshFile {
         let (opened, input, file) = Opened::bytes(path, spool, limits, progress)?;
         let kind = sniff::sniff(&input).map_err(|rejection| rejection.at(path))?;
         let content = Content::of(kind, &input, &Context { path, spool, limits, progress })?;
-        let Content { source, format, findings, header, unit, positions } = content;
-        Ok(Self { opened, name: path.to_owned(), file, input, source, format, findings, header, unit, positions })
+        let Content { source, format, findings, header, unit, positions, coloured } = content;
+        Ok(Self { opened, name: path.to_owned(), file, input, source, format, findings, header, unit, positions, coloured })
     }
 
     /// The triangles in input order, those with NaN or infinite coordinates included.
@@ -194,6 +197,11 @@ impl MeshFile {
     /// The positions that its faces name by number, where it has one table of them.
     pub(crate) fn vertices(&self) -> Option<Vertices<'_>> {
         Some(self.positions.as_ref()?.vertices(&self.input))
+    }
+
+    /// It has colours or materials in a form that no result keeps.
+    pub(crate) fn is_coloured(&self) -> bool {
+        self.coloured
     }
 
     /// The open file that holds the input, and the place in it where `part` of [`MeshFile::bytes`] or of the records lies, if it does: for copies that

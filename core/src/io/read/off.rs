@@ -50,7 +50,7 @@ pub(super) fn read(bytes: &[u8], context: &Context<'_>) -> Result<Parsed> {
         tail::behind_text(whole, zeros)
     });
     let (records, positions) = (faces.map()?, Some(Positions::Spooled(positions)));
-    Ok(Parsed { records, findings, header: binary::header_of(b""), rounding: gathered.1, unit: None, positions })
+    Ok(Parsed { records, findings, header: binary::header_of(b""), rounding: gathered.1, unit: None, positions, coloured: false })
 }
 
 /// Whether `bytes` begin with a keyword of OFF, after blanks and comments.

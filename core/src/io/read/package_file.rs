@@ -252,6 +252,7 @@ pub(super) fn built(model: &Model, context: &Context<'_>) -> Result<Parsed> {
         rounding: rounding.if_any(),
         unit: Some(model.unit().name()),
         positions: None,
+        coloured: false,
     })
 }
 

@@ -38,6 +38,8 @@ pub(crate) struct Parsed {
     pub(crate) unit: Option<&'static str>,
     /// The positions that faces name by number, where the file has one table of them.
     pub(crate) positions: Option<Positions>,
+    /// It has colours or materials in a form that no result keeps.
+    pub(crate) coloured: bool,
 }
 
 /// Paths, limits and progress of a reading.

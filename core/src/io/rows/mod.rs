@@ -39,6 +39,7 @@ impl<'a> Said<'a> {
             Format::Ply => (vertices.and_then(|vertices| boxed(Ply::of(bytes, vertices)?)), ply::says_more(bytes)),
             Format::Off => (vertices.and_then(|vertices| boxed(Off::of(bytes, vertices)?)), off::says_more(bytes)),
             Format::Obj => (vertices.and_then(|vertices| boxed(Obj::of(bytes, vertices)?)), true),
+            Format::Amf => (None, mesh.is_coloured()),
             _ => (None, false),
         };
         match rows {

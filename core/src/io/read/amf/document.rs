@@ -6,7 +6,7 @@ use super::super::rounding::Rounding;
 use super::super::spool::Context;
 use super::intake::Intake;
 use super::placement::Placement;
-use super::stretch::{End, Kind};
+use super::stretch::{End, Kind, is_colour};
 use super::xml::{Tag, Token, Tokens, Trouble};
 use crate::contract::error::{Error, Result};
 
@@ -86,6 +86,8 @@ pub(super) struct Document {
     pub(super) instances: Vec<Instance>,
     /// Made by Slic3r or one of its descendants, whose angles are in radians.
     pub(super) radians: bool,
+    /// It has colours or materials.
+    pub(super) is_coloured: bool,
     /// Volumes of support material.
     pub(super) supports: u64,
     /// Shifts, angles and scales that are no numbers.
@@ -173,6 +175,7 @@ impl Document {
                 Token::Start(tag) => match *tokens.open() {
                     [_, b"object", b"mesh", name @ (b"vertices" | b"volume")] => {
                         let kind = if name == b"volume" { Kind::Triangles } else { Kind::Vertices };
+                        self.is_coloured |= word(&tag, b"materialid").is_some();
                         self.supports += u64::from(kind == Kind::Triangles && word(&tag, b"type").as_deref() == Some(b"support"));
                         if !tokens.is_empty() {
                             self.children((text, tokens), kind, context, intake)?;
@@ -256,7 +259,8 @@ impl Document {
                 let last = self.objects.len().checked_sub(1).and_then(|last| self.names.get_mut(last));
                 last.filter(|_| !name.is_empty()).into_iter().for_each(|known| known.clone_from(&name));
             }
-            _ => {}
+            [.., name] => self.is_coloured |= is_colour(name),
+            [] => {}
         }
         Ok(())
     }

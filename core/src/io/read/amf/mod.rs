@@ -90,7 +90,8 @@ pub(super) fn read(text: &[u8], context: &Context<'_>) -> Result<Parsed> {
     let name = if document.name.is_empty() { &document.name_of_object } else { &document.name };
     let header = binary::header_of(name);
     let (records, rounding) = (placed.records, placed.rounding.if_any());
-    Ok(Parsed { records, findings, header, rounding, unit: unit_of(&document), positions: None })
+    let coloured = document.is_coloured || notes.colours > 0;
+    Ok(Parsed { records, findings, header, rounding, unit: unit_of(&document), positions: None, coloured })
 }
 
 /// The name of the unit, if it is one of AMF's.

@@ -55,6 +55,8 @@ pub(super) struct Notes {
     pub(super) normals: u64,
     /// Curved edges.
     pub(super) edges: u64,
+    /// Colours and places in textures.
+    pub(super) colours: u64,
     /// [`POINT`] and [`COMMA`], as they were seen.
     pub(super) separators: u8,
 }
@@ -67,6 +69,7 @@ impl Notes {
         self.first_damage = self.first_damage.or(behind.first_damage);
         self.normals += behind.normals;
         self.edges += behind.edges;
+        self.colours += behind.colours;
         self.separators |= behind.separators;
     }
 
@@ -159,7 +162,10 @@ impl Stretch {
                     tokens.skip()?;
                     self.notes.edges += 1;
                 }
-                _ => tokens.skip()?,
+                _ => {
+                    self.notes.colours += u64::from(is_colour(tag.name));
+                    tokens.skip()?;
+                }
             }
         }
         self.at = tokens.at();
@@ -175,6 +181,7 @@ impl Stretch {
                 Token::Start(tag) if tag.name == b"coordinates" => coordinates(tokens, &mut texts)?,
                 Token::Start(tag) => {
                     normals += u64::from(tag.name == b"normal");
+                    self.notes.colours += u64::from(is_colour(tag.name));
                     tokens.skip()?;
                 }
                 Token::End => break,
@@ -207,7 +214,8 @@ impl Stretch {
                         b"v1" => a,
                         b"v2" => b,
                         b"v3" => c,
-                        _ => {
+                        name => {
+                            self.notes.colours += u64::from(is_colour(name));
                             tokens.skip()?;
                             continue;
                         }
@@ -256,6 +264,11 @@ impl Stretch {
         }
         self.indices.push(triangle);
     }
+}
+
+/// An element that colours what it stands in (ISO/ASTM 52915, section 6.5 and 6.6).
+pub(super) fn is_colour(name: &[u8]) -> bool {
+    matches!(name, b"color" | b"texmap" | b"map")
 }
 
 /// Reads the element `coordinates` that has begun.

@@ -125,7 +125,7 @@ pub(super) fn read(bytes: &[u8], start: usize, context: &Context<'_>) -> Result<
     findings.extend(tally.findings());
     let (header, rounding) = (header(&found), found.rounding.if_any());
     let positions = Some(Positions::Spooled(positions));
-    Ok(Parsed { records: records.map()?, findings, header, rounding, unit: None, positions })
+    Ok(Parsed { records: records.map()?, findings, header, rounding, unit: None, positions, coloured: false })
 }
 
 fn windows_at_a_time() -> usize {
@@ -234,7 +234,6 @@ fn findings(bytes: &[u8], found: &Survey, cut_off: bool) -> Vec<Finding> {
         )
     });
     note(found.weighted > 0, true, &|| format!("weights of {}, which faces have no use for", vertices_word(found.weighted)));
-    note(found.coloured > 0, true, &|| format!("colours of {}, left out", vertices_word(found.coloured)));
     note(found.lines + found.points > 0, true, &|| format!("{}, which are no surface, left out", lines_and_points(found)));
     note(found.curves > 0, false, &|| {
         format!("{} in free form, left out", Counted(found.curves, "curve or surface", "curves and surfaces"))

@@ -21,8 +21,6 @@ pub(super) struct Survey {
     pub(super) separators: u8,
     /// Vertices with a weight that is not 1.
     pub(super) weighted: u64,
-    /// Vertices with a colour.
-    pub(super) coloured: u64,
     pub(super) rounding: Rounding,
     pub(super) faces: u64,
     pub(super) points: u64,
@@ -50,7 +48,6 @@ impl Survey {
         self.first_damage = self.first_damage.or(next.first_damage);
         self.separators |= next.separators;
         self.weighted += next.weighted;
-        self.coloured += next.coloured;
         self.rounding.append(next.rounding);
         self.faces += next.faces;
         self.points += next.points;
@@ -190,7 +187,6 @@ fn beyond_position(cursor: &mut Cursor<'_>, found: &mut Survey) {
         *place = number.map(|(number, _)| number);
         count += 1;
     }
-    found.coloured += u64::from(count >= 3);
     let weight = numbers[0].filter(|_| count == 1 || count == 4);
     found.weighted += u64::from(weight.is_some_and(|weight| weight.value != 1.0));
 }

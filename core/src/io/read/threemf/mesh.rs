@@ -66,7 +66,15 @@ impl Model {
         let mut findings = points.findings();
         findings.extend(told.findings());
         let header = binary::header_of(object.name.as_bytes());
-        let parsed = Parsed { records, findings, header, rounding: points.rounding.if_any(), unit: None, positions: None };
+        let parsed = Parsed {
+            records,
+            findings,
+            header,
+            rounding: points.rounding.if_any(),
+            unit: None,
+            positions: None,
+            coloured: false,
+        };
         let TriangleCounts { tally, with_any, .. } = told;
         Ok(MeshRecords { parsed, positions, triangles: tally.faces, with_any })
     }

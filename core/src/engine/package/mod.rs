@@ -64,7 +64,7 @@ pub(crate) fn inspect(package: &PackageFile, work: Work<'_>, clock: &mut Clock) 
 /// # Errors
 /// [`Error`], any of them.
 pub(crate) fn repair_as(package: &PackageFile, output: &Path, work: Work<'_>, clock: &mut Clock) -> Result<Report> {
-    if work.profile.format == OutputFormat::Input {
+    if matches!(work.profile.format, OutputFormat::Input | OutputFormat::ThreeMf) {
         return repair(package, output, work, clock);
     }
     let spool = Nameless::new(work.limits)?;

@@ -142,10 +142,9 @@ fn judge(package: &PackageFile, changed: &Changed, report: &mut Report, profile:
         ),
     };
     if changed.objects_without_sets > 0 {
-        report
-            .input
-            .findings
-            .push(format!("sets of triangles of {sets} are left out: they name triangles by numbers, which are others now"));
+        report.input.findings.push(format!(
+            "sets of triangles of {sets} are left out: there are too many, or they are in a form that is not understood"
+        ));
     }
     match profile.attributes {
         KeepAttributes::Refuse if harmed > 0 => {

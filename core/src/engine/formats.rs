@@ -199,8 +199,12 @@ fn refuse_repeated(mesh: &MeshFile, path: &Path, layout: Layout, limits: &Limits
 fn check_space(mesh: &MeshFile, output: &Path, layout: Option<Layout>, limits: &Limits) -> Result<()> {
     let folder = if emit::is_nameless(output) { limits.spool_folder() } else { folder_of(output).into() };
     let each = layout.map_or(size_of::<Record>() as u64, Layout::bytes_a_triangle);
-    let bytes = (mesh.records().len() as u64 * each).max(mesh.byte_len());
-    disk_space::check(mesh.path(), &[Need { folder, bytes, what: "the output" }])
+    let triangles = mesh.records().len() as u64;
+    let mut needs = vec![Need { folder, bytes: (triangles * each).max(mesh.byte_len()), what: "the output" }];
+    if let Some(bytes) = layout.and_then(Layout::unpacked_bytes_a_triangle) {
+        needs.push(Need { folder: limits.spool_folder(), bytes: triangles * bytes, what: "the text of the package" });
+    }
+    disk_space::check(mesh.path(), &needs)
 }
 
 /// Copies the file `input` to the new file `output`, and opens the copy.

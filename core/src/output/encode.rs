@@ -93,6 +93,11 @@ impl Layout {
         }
     }
 
+    /// Bytes for each triangle of a closed mesh, about, that reading such a file unpacks.
+    pub(crate) fn unpacked_bytes_a_triangle(self) -> Option<u64> {
+        matches!(self, Self::ThreeMf(_)).then_some(80)
+    }
+
     fn vertex(self, point: Point, out: &mut Vec<u8>) {
         let [x, y, z] = point;
         let (a, b, c, end) = match self {

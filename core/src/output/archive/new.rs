@@ -11,13 +11,15 @@ use crate::contract::settings::Limits;
 /// Takes the bytes of a content one after the other.
 pub(crate) type Sink<'s> = dyn FnMut(&[u8]) -> Result<()> + Send + 's;
 
+/// Gives a content to a sink.
+pub(crate) type Fill<'p> = Box<dyn FnOnce(&mut Sink<'_>) -> Result<()> + Send + 'p>;
+
 /// A new entry.
 pub(crate) struct Part<'p> {
     pub(crate) name: &'p str,
     /// Bytes of the content, at most.
     pub(crate) most: u64,
-    /// Gives the content.
-    pub(crate) fill: Box<dyn FnOnce(&mut Sink<'_>) -> Result<()> + Send + 'p>,
+    pub(crate) fill: Fill<'p>,
 }
 
 /// Writes these entries, whose names are ASCII, to the new file `output`, and syncs it unless that is deferred. Call it within a pool of threads.

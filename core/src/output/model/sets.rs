@@ -1,7 +1,8 @@
 //! Sets of triangles, written with the numbers that their triangles have now.
 //!
 //! **In:** the text of an object's sets, and for each triangle of the output a triangle of the text that is in the same sets.
-//! **Out:** the text with other references where numbers are others: single triangles first, then ranges, as the schema has them.
+//! **Out:** the text with other references where numbers are others. A set that had ranges has single triangles first, then ranges; another one has single
+//! triangles alone, since there are readers that know no others (lib3mf 2.5).
 //! **Promise:** a set whose numbers are the same stays byte for byte; of another one all but its references does.
 //!
 //! By the 3MF Core Specification 1.3, section 4.1, Triangle Sets. Triangles that are in the same sets are a class, so that whoever asks for a triangle's
@@ -24,12 +25,20 @@ pub(super) struct Sets<'t> {
     text: &'t [u8],
     /// Where they stand.
     range: Range<usize>,
-    /// The triangles of each, sorted and apart.
-    members: Vec<Vec<Range<u32>>>,
+    sets: Vec<Set>,
     /// From this triangle on all are of this class, up to the next entry.
     stretches: Vec<(u32, u32)>,
     /// The sets of each class.
     classes: Vec<Vec<u32>>,
+}
+
+/// A set.
+#[derive(Default)]
+struct Set {
+    /// Its triangles, sorted and apart.
+    members: Vec<Range<u32>>,
+    /// It refers to ranges, too.
+    has_ranges: bool,
 }
 
 /// The classes of the output's triangles, in order.
@@ -53,9 +62,9 @@ impl Runs {
 impl<'t> Sets<'t> {
     /// Of a mesh of so many triangles. `None` for sets in a form that is not understood, or too many of them. O(text + n log n) in the references.
     pub(super) fn parse(text: &'t [u8], range: Range<usize>, triangles: u32) -> Option<Self> {
-        let members = members(text, range.clone(), triangles)?;
-        let (stretches, classes) = classes(&members)?;
-        Some(Self { text, range, members, stretches, classes })
+        let sets = sets(text, range.clone(), triangles)?;
+        let (stretches, classes) = classes(&sets)?;
+        Some(Self { text, range, sets, stretches, classes })
     }
 
     /// The class of a triangle of the text. O(log n).
@@ -66,7 +75,7 @@ impl<'t> Sets<'t> {
 
     /// The triangles of each set in the output. `None` for too many of them.
     fn renumbered(&self, runs: &Runs) -> Option<Vec<Vec<Range<u32>>>> {
-        let mut all = vec![Vec::new(); self.members.len()];
+        let mut all = vec![Vec::new(); self.sets.len()];
         let ends = runs.begins.iter().skip(1).map(|(first, _)| *first).chain([runs.count]);
         let mut work = 0;
         for ((first, class), end) in runs.begins.iter().zip(ends) {
@@ -86,15 +95,15 @@ impl<'t> Sets<'t> {
     pub(super) fn write(&self, runs: &Runs, put: &mut dyn FnMut(&[u8])) -> Option<()> {
         let renumbered = self.renumbered(runs)?;
         let mut writing = Writing { text: self.text, at: self.range.start, put };
-        let mut sets = self.members.iter().zip(&renumbered);
+        let mut sets = self.sets.iter().zip(&renumbered);
         let mut elements = Elements::within(self.text, self.range.clone());
         // The set that stands here, unless it stays: the prefix of its name, and what is still to be written of it.
-        let mut open: Option<(&[u8], Option<&[Range<u32>]>)> = None;
+        let mut open: Option<(&[u8], Option<Now<'_>>)> = None;
         while let Some(tag) = elements.next_tag() {
             match tag {
                 Tag::Start(element) if is_set(&element) => {
-                    let changed = sets.next().filter(|(before, now)| before != now);
-                    open = changed.map(|(_, now)| (prefix(element.name), Some(now.as_slice())));
+                    let changed = sets.next().filter(|(set, now)| set.members != **now);
+                    open = changed.map(|(set, now)| (prefix(element.name), Some((set.has_ranges, now.as_slice()))));
                 }
                 Tag::Empty(element) if is_set(&element) => _ = sets.next(),
                 Tag::Start(element) | Tag::Empty(element) => {
@@ -114,6 +123,9 @@ impl<'t> Sets<'t> {
         Some(())
     }
 }
+
+/// The triangles of a set in the output; whether ranges of them may be written.
+type Now<'n> = (bool, &'n [Range<u32>]);
 
 const SET: &[u8] = b"triangleset";
 
@@ -150,23 +162,35 @@ impl Writing<'_, '_> {
 
     /// Writes all references of the set in the place of its first one, and nothing in the place of others. What stands between them stays, unless it is
     /// blank.
-    fn reference(&mut self, element: &Element<'_>, prefix: &[u8], all: Option<&[Range<u32>]>) {
+    fn reference(&mut self, element: &Element<'_>, prefix: &[u8], all: Option<Now<'_>>) {
         let before = self.text.get(self.at..element.whole.start).unwrap_or_default();
         let blanks = before.iter().rev().take_while(|byte| byte.is_ascii_whitespace()).count();
         let (kept, blank) = before.split_at(before.len() - blanks);
         (self.put)(kept);
-        let is_single = |range: &&Range<u32>| range.len() == 1;
-        let all = all.unwrap_or_default();
-        for range in all.iter().filter(is_single).chain(all.iter().filter(|range| !is_single(range))) {
-            let mut text = [blank, b"<", prefix].concat();
+        let begin = [blank, b"<", prefix].concat();
+        let mut text = Vec::new();
+        let (has_ranges, all) = all.unwrap_or_default();
+        let is_range = |range: &&Range<u32>| has_ranges && range.len() > 1;
+        for triangle in all.iter().filter(|range| !is_range(range)).flat_map(Range::clone) {
+            text.extend_from_slice(&begin);
             // Writing to a vector cannot fail.
-            let _ = match range.len() {
-                1 => write!(text, "ref index=\"{}\"/>", range.start),
-                _ => write!(text, "refrange startindex=\"{}\" endindex=\"{}\"/>", range.start, range.end - 1),
-            };
-            (self.put)(&text);
+            let _ = write!(text, "ref index=\"{triangle}\"/>");
+            self.put_if_long(&mut text);
         }
+        for range in all.iter().filter(is_range) {
+            text.extend_from_slice(&begin);
+            let _ = write!(text, "refrange startindex=\"{}\" endindex=\"{}\"/>", range.start, range.end - 1);
+            self.put_if_long(&mut text);
+        }
+        (self.put)(&text);
         self.at = element.whole.end;
+    }
+
+    fn put_if_long(&mut self, text: &mut Vec<u8>) {
+        if text.len() >= 64 << 10 {
+            (self.put)(text);
+            text.clear();
+        }
     }
 }
 
@@ -178,9 +202,9 @@ fn add(all: &mut Vec<Range<u32>>, range: Range<u32>) {
     }
 }
 
-/// The triangles of each set.
-fn members(text: &[u8], range: Range<usize>, triangles: u32) -> Option<Vec<Vec<Range<u32>>>> {
-    let mut all: Vec<Vec<Range<u32>>> = Vec::new();
+/// All sets of a text.
+fn sets(text: &[u8], range: Range<usize>, triangles: u32) -> Option<Vec<Set>> {
+    let mut all: Vec<Set> = Vec::new();
     let (mut open, mut level) = (None, 0i64);
     let mut elements = Elements::within(text, range);
     while let Some(tag) = elements.next_tag() {
@@ -188,15 +212,17 @@ fn members(text: &[u8], range: Range<usize>, triangles: u32) -> Option<Vec<Vec<R
             Tag::Start(element) if is_set(&element) => {
                 // A set in a set is none that is known.
                 open.replace(prefix(element.name)).is_none().then_some(())?;
-                all.push(Vec::new());
+                all.push(Set::default());
                 level += 1;
             }
-            Tag::Empty(element) if is_set(&element) => all.push(Vec::new()),
+            Tag::Empty(element) if is_set(&element) => all.push(Set::default()),
             Tag::Start(element) | Tag::Empty(element) => {
                 if let (Some(set), Some(prefix)) = (all.last_mut(), open)
                     && is_reference(&element, prefix)
                     && let Some(range) = referred(&element, triangles)
                 {
+                    set.has_ranges |= local(element.name) == b"refrange";
+                    let set = &mut set.members;
                     // Most sets are in order, and become short at once.
                     if set.last().is_some_and(|last| last.start <= range.start) { add(set, range) } else { set.push(range) }
                 }
@@ -210,7 +236,8 @@ fn members(text: &[u8], range: Range<usize>, triangles: u32) -> Option<Vec<Vec<R
     }
     // Text that is not understood ends the tags early.
     (level == 0 && elements.is_at_end()).then_some(())?;
-    Some(all.into_iter().map(sorted).collect())
+    all.iter_mut().for_each(|set| set.members = sorted(std::mem::take(&mut set.members)));
+    Some(all)
 }
 
 fn sorted(mut ranges: Vec<Range<u32>>) -> Vec<Range<u32>> {
@@ -234,11 +261,11 @@ fn referred(element: &Element<'_>, triangles: u32) -> Option<Range<u32>> {
 type Classes = (Vec<(u32, u32)>, Vec<Vec<u32>>);
 
 /// The classes of triangles by the sets that they are in, and where each begins.
-fn classes(members: &[Vec<Range<u32>>]) -> Option<Classes> {
+fn classes(sets: &[Set]) -> Option<Classes> {
     let mut events: Vec<(u32, bool, u32)> = Vec::new();
-    for (set, ranges) in members.iter().enumerate() {
-        let set = u32::try_from(set).ok()?;
-        events.extend(ranges.iter().flat_map(|range| [(range.start, true, set), (range.end, false, set)]));
+    for (number, set) in sets.iter().enumerate() {
+        let number = u32::try_from(number).ok()?;
+        events.extend(set.members.iter().flat_map(|range| [(range.start, true, number), (range.end, false, number)]));
     }
     events.sort_unstable();
     let (mut known, mut active) = (BTreeMap::from([(Vec::new(), IN_NONE)]), BTreeSet::new());
@@ -323,6 +350,13 @@ mod tests {
     }
 
     #[test]
+    fn a_set_without_ranges_gets_none() {
+        let text = "<triangleset>\n<ref index=\"2\"/> <ref index=\"1\"/>\n</triangleset>";
+        let expected = "<triangleset>\n<ref index=\"0\"/>\n<ref index=\"1\"/>\n<ref index=\"2\"/>\n</triangleset>";
+        assert_eq!(written(text, 4, &[Some(1), Some(2), Some(2), Some(3)]).as_deref(), Some(expected));
+    }
+
+    #[test]
     fn what_is_not_understood_is_none() {
         let nested = "<s><triangleset><triangleset><ref index=\"0\"/></triangleset></triangleset></s>";
         let cut = "<s><triangleset><ref index=\"0";
@@ -358,9 +392,9 @@ mod tests {
             let text: String = sets.iter().map(set).collect();
             let now = written(&text, 20, &sources).unwrap();
             let count = sources.len() as u32;
-            let back = members(now.as_bytes(), 0..now.len(), count).unwrap();
+            let back = super::sets(now.as_bytes(), 0..now.len(), count).unwrap();
             prop_assert_eq!(back.len(), sets.len());
-            for (set, members) in sets.iter().zip(back) {
+            for (set, Set { members, .. }) in sets.iter().zip(back) {
                 let holds = |k: u32| set.iter().any(|(from, more)| (*from..=from + more).contains(&k));
                 for (k, source) in (0..).zip(&sources) {
                     prop_assert_eq!(members.iter().any(|range| range.contains(&k)), source.is_some_and(holds), "{}", &now);

@@ -187,7 +187,7 @@ pub(crate) struct RepairArgs {
     /// Where to write: a file name, or a folder (needed for several inputs; part.stl, then part~2.stl)
     #[arg(short, long, value_name = "OUT|DIR")]
     pub output: PathBuf,
-    /// Format of the result: stl, ply, off, obj or amf [default: that of OUT's ending, or else of IN]
+    /// Format of the result: stl, 3mf, ply, off, obj or amf [default: that of OUT's ending, or else of IN]
     #[arg(long, value_name = "FORMAT", value_parser = parse_format)]
     pub format: Option<OutputFormat>,
     /// Write the full report as JSON to this file (for several inputs: into this folder)

@@ -23,18 +23,11 @@ pub(crate) fn repair(args: &RepairArgs) -> Exit {
         let of_name = || args.output.extension().and_then(|ending| OutputFormat::of_ending(ending.to_str()?));
         let is_folder = fsx::is_folder(&args.output).unwrap_or(false);
         profile.format = args.format.or_else(|| of_name().filter(|_| !is_folder)).unwrap_or(profile.format);
-        if !is_folder && has_ending(&args.output, "3mf") && !args.inputs.iter().all(|input| has_ending(input, "3mf")) {
-            return Err(format!("{}: a 3MF is written only of a 3MF; name another format", args.output.display()));
-        }
         let naming = Some(Naming::new(args, profile.format)?);
         let limits = args.spend.limits(args.list_edit);
         Ok(Order { inputs: &args.inputs, profile, limits, naming, certificate: None, json: args.json })
     });
     carry_out(order)
-}
-
-fn has_ending(path: &Path, ending: &str) -> bool {
-    path.extension().is_some_and(|own| own.eq_ignore_ascii_case(ending))
 }
 
 /// Diagnoses every input, or checks the certificate of one.

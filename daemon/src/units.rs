@@ -142,8 +142,8 @@ pub(crate) fn parse_listen(text: &str) -> Result<SocketAddr, String> {
     text.parse().map_err(|_| format!("`{text}` is no address with a port (try 127.0.0.1:7878)"))
 }
 
-/// Formats of results that can be asked for, by their endings. A 3MF is written for a 3MF only.
-pub(crate) const WRITTEN: &str = "stl, ply, off, obj, amf";
+/// Formats of results that can be asked for, by their endings.
+pub(crate) const WRITTEN: &str = "stl, 3mf, ply, off, obj, amf";
 
 /// The format whose names have this ending.
 ///

@@ -46,9 +46,9 @@ def repair_file(
 ) -> dict[str, Any]:
     """Repairs a mesh file (STL, 3MF, PLY, OFF, OBJ, AMF) of any size into a new file, and returns the report.
 
-    The output has the format that its name ends in (``.stl``, ``.ply``, ``.off``, ``.obj``, ``.amf``), or else that of the input;
-    ``profile={"format": "stl"}`` chooses in any case. A 3MF is written only of a 3MF. Of a repaired PLY, OFF, OBJ or AMF, positions and triangles are
-    written, nothing else.
+    The output has the format that its name ends in (``.stl``, ``.3mf``, ``.ply``, ``.off``, ``.obj``, ``.amf``), or else that of the
+    input; ``profile={"format": "stl"}`` chooses in any case. A 3MF of another format is a package with one object. Of a repaired PLY, OFF, OBJ or AMF,
+    positions and triangles are written, nothing else.
 
     The output appears under its name when it is complete and on the disk, whatever the outcome: look at ``report["outcome"]``. It has the same
     bytes whatever ``memory`` and ``threads`` are. The input is never written to. If there is a file of that name already, it is replaced only
@@ -58,8 +58,6 @@ def repair_file(
     output = Path(output)
     if not replace and os.path.lexists(output):
         raise FileExistsError(f"{output} exists already; replace=True replaces it")
-    if output.suffix.lower() == ".3mf" and Path(path).suffix.lower() != ".3mf":
-        raise ValueError(f"{output}: a 3MF is written only of a 3MF")
     if output.is_dir():
         raise IsADirectoryError(f"{output} is a folder; the output is a file")
     if output.exists() and os.path.exists(path) and output.samefile(path):

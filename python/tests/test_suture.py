@@ -250,14 +250,15 @@ class Files(unittest.TestCase):
         other = Path(self.folder.name, "other.ply")
         self.assertEqual(suture.repair_file(self.input, other)["output"]["format"], "ply")
         self.assertTrue(other.read_bytes().startswith(b"ply\n"))
-        with self.assertRaises(ValueError):
-            suture.repair_file(self.input, Path(self.folder.name, "other.3mf"))
+        package = Path(self.folder.name, "other.3mf")
+        self.assertEqual(suture.repair_file(self.input, package)["output"]["format"], "3mf")
+        self.assertEqual(suture.inspect_file(package)["outcome"], "clean")
         report = suture.repair_file(self.input, Path(self.folder.name, "none.stl"), profile="inspect-only")
         self.assertEqual((report["outcome"], report["output"]), ("not_good", None))
         suture.repair_file(self.input, self.output, replace=True, profile="cautious")
         self.assertEqual(len(read_stl(self.output)), 11)
         self.assertEqual(self.input.read_bytes(), before)
-        self.assertEqual(sorted(os.listdir(self.folder.name)), ["again.stl", "in.stl", "other.ply", "out.stl"])
+        self.assertEqual(sorted(os.listdir(self.folder.name)), ["again.stl", "in.stl", "other.3mf", "other.ply", "out.stl"])
 
     def test_errors_have_classes_that_python_knows(self):
         picture = Path(self.folder.name, "picture.stl")

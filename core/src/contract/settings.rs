@@ -186,6 +186,9 @@ pub enum OutputFormat {
     Obj,
     /// AMF, not compressed.
     Amf,
+    /// A 3MF package; of an input that is none, one with a single object.
+    #[serde(rename = "3mf")]
+    ThreeMf,
 }
 
 impl OutputFormat {
@@ -197,7 +200,7 @@ impl OutputFormat {
     /// assert_eq!(OutputFormat::of_ending("step"), None);
     /// ```
     pub fn of_ending(ending: &str) -> Option<Self> {
-        [Self::Stl, Self::Ply, Self::Off, Self::Obj, Self::Amf]
+        [Self::Stl, Self::ThreeMf, Self::Ply, Self::Off, Self::Obj, Self::Amf]
             .into_iter()
             .find(|format| format.ending().is_some_and(|own| own.eq_ignore_ascii_case(ending)))
     }
@@ -211,6 +214,7 @@ impl OutputFormat {
             Self::Off => Some("off"),
             Self::Obj => Some("obj"),
             Self::Amf => Some("amf"),
+            Self::ThreeMf => Some("3mf"),
         }
     }
 }

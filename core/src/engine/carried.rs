@@ -42,13 +42,18 @@ pub(crate) fn heed(report: &mut Report, profile: &Profile, harm: Option<String>)
             (report.output, report.certificate) = (None, None);
             return false;
         }
-        KeepAttributes::Keep if report.outcome.is_good() => {
-            report.outcome = Outcome::NeedsReview;
-            report.verdict.reasons.insert(0, harm);
-        }
-        KeepAttributes::Keep | KeepAttributes::Best => {}
+        KeepAttributes::Keep => ask_for_review(report, harm),
+        KeepAttributes::Best => {}
     }
     true
+}
+
+/// Asks a person to look at a result that is good, or that somebody has to look at anyway.
+pub(crate) fn ask_for_review(report: &mut Report, reason: String) {
+    if report.outcome.is_good() || report.outcome == Outcome::NeedsReview {
+        report.outcome = Outcome::NeedsReview;
+        report.verdict.reasons.insert(0, reason);
+    }
 }
 
 /// The harm that an account tells of.

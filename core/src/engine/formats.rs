@@ -49,8 +49,13 @@ pub(crate) fn target(input: Format, unit: Option<&'static str>, wanted: OutputFo
         OutputFormat::Off => Some(Layout::Off),
         OutputFormat::Obj => Some(Layout::Obj),
         OutputFormat::Amf => Some(amf(unit)),
+        OutputFormat::ThreeMf => Some(three_mf(unit)),
     };
-    Target { layout, is_input: layout == own && input != Format::ThreeMf }
+    let is_input = match input {
+        Format::ThreeMf => matches!(wanted, OutputFormat::Input | OutputFormat::ThreeMf),
+        _ => layout == own,
+    };
+    Target { layout, is_input }
 }
 
 /// AMF has no centimeter, and another name for the foot; a file without a unit is one of millimeters to all printers.
@@ -58,6 +63,15 @@ fn amf(unit: Option<&'static str>) -> Layout {
     Layout::Amf(match unit {
         Some(unit @ ("inch" | "meter" | "micron")) => unit,
         Some("feet" | "foot") => "feet",
+        _ => "millimeter",
+    })
+}
+
+/// 3MF has the units of all other formats.
+fn three_mf(unit: Option<&'static str>) -> Layout {
+    Layout::ThreeMf(match unit {
+        Some(unit @ ("micron" | "centimeter" | "inch" | "foot" | "meter")) => unit,
+        Some("feet") => "foot",
         _ => "millimeter",
     })
 }
@@ -103,8 +117,11 @@ pub(crate) fn through_a_spool(
     if !carried::heed(&mut report, profile, account.and_then(carried::harm)) {
         return Ok(report);
     }
-    let written =
-        if is_copy { copy(input, output, limits, progress)? } else { write(&spool, output, (planned, layout), work, clock)? };
+    let written = if is_copy {
+        copy(input, output, limits, progress)?
+    } else {
+        write((&spool, input), output, (planned, layout), work, clock)?
+    };
     let facts = files::facts(&written, files::hash(&written, limits, progress));
     if is_copy && facts.blake3 != report.input.blake3 {
         return Err(Error::Changed { path: input.into() });
@@ -117,9 +134,9 @@ pub(crate) fn through_a_spool(
     Ok(report)
 }
 
-/// Writes the STL `spool` to the new file `output`, in the rows of its file where there is a plan of that, and reads it back.
+/// Writes the STL `spool` of `input` to the new file `output`, in the rows of its file where there is a plan of that, and reads it back.
 fn write(
-    spool: &Path,
+    (spool, input): (&Path, &Path),
     output: &Path,
     (planned, layout): (Option<Planned<'_>>, Layout),
     Work { limits, progress, .. }: Work<'_>,
@@ -128,7 +145,10 @@ fn write(
     let made = files::open(spool, limits, progress)?;
     let written = match &planned {
         Some(planned) => carried::write(planned, output, limits, progress)?,
-        None => encode(&made, output, layout, limits, progress)?,
+        None => {
+            refuse_repeated(&made, input, layout, limits)?;
+            encode(&made, output, layout, limits, progress)?
+        }
     };
     clock.stage("encode");
     match &planned {
@@ -157,6 +177,7 @@ pub(crate) fn convert(
     let written = match target.layout {
         Some(layout) if !target.is_input => {
             refuse_infinite(&mesh)?;
+            refuse_repeated(&mesh, input, layout, limits)?;
             let written = encode(&mesh, output, layout, limits, progress)?;
             confirm(&mesh, &written, limits)?;
             written
@@ -189,12 +210,36 @@ fn refuse_infinite(mesh: &MeshFile) -> Result<()> {
     })
 }
 
+/// The three vertices of a 3MF's triangle must be distinct (3MF Core 1.3, section 4.1: Triangle), and readers refuse a package where they are not.
+fn refuse_repeated(mesh: &MeshFile, path: &Path, layout: Layout, limits: &Limits) -> Result<()> {
+    if !matches!(layout, Layout::ThreeMf(_)) {
+        return Ok(());
+    }
+    let is_repeated = |record: &&Record| {
+        let [a, b, c] = position::corners(record).map(position::bits);
+        a == b || b == c || c == a
+    };
+    let count = parallel::in_pool(limits.threads, || mesh.records().par_iter().filter(is_repeated).count());
+    if count == 0 {
+        return Ok(());
+    }
+    Err(Error::Refused {
+        path: path.into(),
+        reason: format!("{} with two corners at one place, which 3MF does not allow", triangles(count as u64)),
+        advice: "`suture repair` takes them out, and other formats hold them".into(),
+    })
+}
+
 /// Is there room for the output? (That for the STL is looked at when it is written.)
 fn check_space(mesh: &MeshFile, output: &Path, layout: Option<Layout>, limits: &Limits) -> Result<()> {
     let folder = if emit::is_nameless(output) { limits.spool_folder() } else { folder_of(output).into() };
     let each = layout.map_or(size_of::<Record>() as u64, Layout::bytes_a_triangle);
-    let bytes = (mesh.records().len() as u64 * each).max(mesh.byte_len());
-    disk_space::check(mesh.path(), &[Need { folder, bytes, what: "the output" }])
+    let triangles = mesh.records().len() as u64;
+    let mut needs = vec![Need { folder, bytes: (triangles * each).max(mesh.byte_len()), what: "the output" }];
+    if let Some(bytes) = layout.and_then(Layout::unpacked_bytes_a_triangle) {
+        needs.push(Need { folder: limits.spool_folder(), bytes: triangles * bytes, what: "the text of the package" });
+    }
+    disk_space::check(mesh.path(), &needs)
 }
 
 /// Copies the file `input` to the new file `output`, and opens the copy.
@@ -228,12 +273,97 @@ fn confirm(made: &MeshFile, written: &MeshFile, limits: &Limits) -> Result<()> {
 
 #[cfg(test)]
 mod tests {
+    use std::path::PathBuf;
+
     use super::*;
+    use crate::contract::progress::Quiet;
+    use crate::contract::report::Outcome;
+    use crate::contract::settings::Profile;
+    use crate::testing::{Corners, cube, plate, records};
 
     #[test]
     fn the_profile_decides_and_else_the_input() {
         let of = |wanted| target(Format::AsciiStl, None, wanted);
         assert_eq!(of(OutputFormat::Ply), Target { layout: Some(Layout::Ply), is_input: false });
         assert_eq!([of(OutputFormat::Input), of(OutputFormat::Stl)], [Target { layout: None, is_input: true }; 2]);
+        let package = |wanted| target(Format::ThreeMf, Some("inch"), wanted).is_input;
+        assert!(package(OutputFormat::Input) && package(OutputFormat::ThreeMf) && !package(OutputFormat::Stl));
+    }
+
+    #[test]
+    fn a_package_has_the_unit_of_the_input() {
+        let unit = |input, unit| target(input, unit, OutputFormat::ThreeMf).layout;
+        assert_eq!(unit(Format::Amf, Some("feet")), Some(Layout::ThreeMf("foot")));
+        assert_eq!(unit(Format::Amf, Some("micron")), Some(Layout::ThreeMf("micron")));
+        assert_eq!(unit(Format::Off, None), Some(Layout::ThreeMf("millimeter")));
+    }
+
+    /// The path of a new STL of these triangles.
+    fn stl(folder: &Path, triangles: &[Corners]) -> PathBuf {
+        let (path, records) = (folder.join("part.stl"), records(triangles));
+        std::fs::write(&path, [&[0; 80][..], &(records.len() as u32).to_le_bytes(), records.as_flattened()].concat()).unwrap();
+        path
+    }
+
+    fn repaired(input: &Path, output: &Path, format: OutputFormat, limits: &Limits) -> Report {
+        let profile = Profile { format, ..Profile::default() };
+        crate::repair(input, output, &profile, limits, &Quiet).unwrap()
+    }
+
+    #[test]
+    fn a_mesh_becomes_a_package_whatever_memory_and_threads() {
+        let folder = tempfile::tempdir().unwrap();
+        let input = stl(folder.path(), &plate(110, |x, y| (x, y) != (50, 50)));
+        let mut packages = Vec::new();
+        for (memory_bytes, threads) in [(1 << 30, 1), (64 << 20, 3)] {
+            let limits = Limits { memory_bytes, threads, ..Limits::default() };
+            let output = folder.path().join(format!("{threads}.3mf"));
+            convert(&input, &output, OutputFormat::ThreeMf, &limits, &Quiet).unwrap();
+            let [came, made] = [&input, &output].map(|path| files::open(path, &limits, &Quiet).unwrap());
+            assert_eq!((made.format(), made.unit(), made.is_flawless()), (Format::ThreeMf, Some("millimeter"), true));
+            assert!(came.records().iter().map(record::corners).eq(made.records().iter().map(record::corners)));
+            packages.push(std::fs::read(output).unwrap());
+        }
+        assert_eq!(packages[0], packages[1]);
+    }
+
+    #[test]
+    fn what_is_repaired_becomes_a_package_that_is_good() {
+        let folder = tempfile::tempdir().unwrap();
+        let limits = Limits { threads: 2, ..Limits::default() };
+        let mut open = cube();
+        open.pop();
+        let [first, again] = ["first.3mf", "again.3mf"].map(|name| folder.path().join(name));
+        let report = repaired(&stl(folder.path(), &open), &first, OutputFormat::ThreeMf, &limits);
+        assert_eq!((report.outcome, report.verdict.good), (Outcome::Repaired, true));
+        let facts = report.output.unwrap();
+        assert_eq!((facts.format, facts.triangles, facts.bytes), (Format::ThreeMf, 12, first.metadata().unwrap().len()));
+        assert_eq!(report.certificate.map(|certificate| certificate.blake3), Some(facts.blake3));
+        // A package that is good is copied, by either name of its format.
+        for format in [OutputFormat::ThreeMf, OutputFormat::Input] {
+            let report = repaired(&first, &again, format, &limits);
+            assert_eq!(report.outcome, Outcome::Clean);
+            assert_eq!(std::fs::read(&again).unwrap(), std::fs::read(&first).unwrap());
+            std::fs::remove_file(&again).unwrap();
+        }
+        convert(&first, &again, OutputFormat::ThreeMf, &limits, &Quiet).unwrap();
+        assert_eq!(std::fs::read(&again).unwrap(), std::fs::read(&first).unwrap());
+    }
+
+    /// Readers refuse a package with such a triangle.
+    #[test]
+    fn a_triangle_with_two_corners_at_one_place_becomes_no_package() {
+        let folder = tempfile::tempdir().unwrap();
+        let limits = Limits { threads: 2, ..Limits::default() };
+        let mut triangles = cube();
+        // Zeros of either sign are one place.
+        triangles.push([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [-0.0, 0.0, 0.0]]);
+        let (input, output) = (stl(folder.path(), &triangles), folder.path().join("part.3mf"));
+        let refused = convert(&input, &output, OutputFormat::ThreeMf, &limits, &Quiet).unwrap_err();
+        assert!(matches!(&refused, Error::Refused { path, .. } if *path == input), "{refused}");
+        assert!(refused.to_string().contains("1 triangle with two corners at one place") && !output.exists(), "{refused}");
+        convert(&input, &folder.path().join("part.off"), OutputFormat::Off, &limits, &Quiet).unwrap();
+        let report = repaired(&input, &output, OutputFormat::ThreeMf, &limits);
+        assert_eq!((report.outcome, report.output.map(|facts| facts.triangles)), (Outcome::Repaired, Some(12)));
     }
 }

@@ -1,11 +1,11 @@
 //! Records as a file of an indexed format.
 //!
 //! **In:** an [`Indexed`] mesh.
-//! **Out:** binary PLY, or text in OFF, OBJ or AMF; coordinates as the shortest decimal that reads back as the same `f32`.
+//! **Out:** binary PLY, text in OFF, OBJ or AMF, or a 3MF package; coordinates as the shortest decimal that reads back as the same `f32`.
 //! **Promise:** vertices and faces in the order of their numbers, the same bytes for any memory and any threads.
 //!
 //! Forms: PLY 1.0 (G. Turk, "The PLY Polygon File Format", 1994), OFF (Geomview's manual, section "OFF Files"), OBJ (Wavefront, "Object Files",
-//! Advanced Visualizer manual, appendix B1), AMF (ISO/ASTM 52915:2020).
+//! Advanced Visualizer manual, appendix B1), AMF (ISO/ASTM 52915:2020), 3MF ([`super::package`]).
 
 use std::io::Write;
 use std::ops::Range;
@@ -18,12 +18,19 @@ use crate::contract::progress::Progress;
 use crate::contract::settings::Limits;
 use crate::io::record::Point;
 use crate::io::write_behind::WriteBehind;
-use crate::output::emit;
+use crate::output::archive::Sink;
 use crate::output::indexed::Indexed;
+use crate::output::{emit, package};
 use crate::util::parallel;
 
 /// Records whose text one thread makes at a time.
 const PIECE: usize = 16 << 10;
+/// Most bytes of a vertex of a 3MF: 26, and three numbers of up to 16 (`-1.17549435e-38`).
+const MOST_A_VERTEX: u64 = 26 + 3 * 16;
+/// Most bytes of a triangle of a 3MF: 30, and three numbers of up to 10.
+const MOST_A_TRIANGLE: u64 = 30 + 3 * 10;
+/// Most bytes of a 3MF's text before, between and behind them.
+const MOST_AROUND: u64 = 4 << 10;
 
 /// A format that vertices and faces are written in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -36,6 +43,8 @@ pub(crate) enum Layout {
     Obj,
     /// XML; coordinates are in units of this name.
     Amf(&'static str),
+    /// XML in a package; coordinates are in units of this name.
+    ThreeMf(&'static str),
 }
 
 /// Text before, between and behind vertices and faces.
@@ -61,12 +70,15 @@ impl Layout {
             Self::Off => Frame { head: format!("OFF\n# {name}\n{vertices} {faces} 0\n"), between: "", tail: "" },
             Self::Obj => Frame { head: format!("# {name}\n# {vertices} vertices, {faces} faces\n"), between: "", tail: "" },
             Self::Amf(unit) => {
-                let name = name.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;");
+                let name = escaped(name);
                 let head = format!(
                     "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<amf unit=\"{unit}\" version=\"1.2\">\n<metadata type=\"name\">{name}</metadata>\n\
                      <object id=\"0\">\n<mesh>\n<vertices>\n"
                 );
                 Frame { head, between: "</vertices>\n<volume>\n", tail: "</volume>\n</mesh>\n</object>\n</amf>\n" }
+            }
+            Self::ThreeMf(unit) => {
+                Frame { head: package::head(unit, &escaped(name)), between: package::BETWEEN, tail: package::TAIL }
             }
         }
     }
@@ -77,40 +89,53 @@ impl Layout {
             Self::Ply => 20,
             Self::Off | Self::Obj => 50,
             Self::Amf(_) => 120,
+            Self::ThreeMf(_) => 20,
         }
+    }
+
+    /// Bytes for each triangle of a closed mesh, about, that reading such a file unpacks.
+    pub(crate) fn unpacked_bytes_a_triangle(self) -> Option<u64> {
+        matches!(self, Self::ThreeMf(_)).then_some(80)
     }
 
     fn vertex(self, point: Point, out: &mut Vec<u8>) {
         let [x, y, z] = point;
-        let (a, b, c) = match self {
+        let (a, b, c, end) = match self {
             Self::Ply => return out.extend(point.iter().flat_map(|value| value.to_le_bytes())),
-            Self::Off => ("", " ", " "),
-            Self::Obj => ("v ", " ", " "),
-            Self::Amf(_) => ("<vertex><coordinates><x>", "</x><y>", "</y><z>"),
+            Self::Off => ("", " ", " ", "\n"),
+            Self::Obj => ("v ", " ", " ", "\n"),
+            Self::Amf(_) => ("<vertex><coordinates><x>", "</x><y>", "</y><z>", "</z></coordinates></vertex>\n"),
+            Self::ThreeMf(_) => ("<vertex x=\"", "\" y=\"", "\" z=\"", "\"/>\n"),
         };
         for (before, value) in [(a, x), (b, y), (c, z)] {
             out.extend_from_slice(before.as_bytes());
             decimal(value, out);
         }
-        out.extend_from_slice(if matches!(self, Self::Amf(_)) { b"</z></coordinates></vertex>\n" } else { b"\n" });
+        out.extend_from_slice(end.as_bytes());
     }
 
     fn face(self, face: [u32; 3], out: &mut Vec<u8>) {
-        let ([a, b, c], from) = match self {
+        let ([a, b, c], end, from) = match self {
             Self::Ply => {
                 out.push(3);
                 return out.extend(face.iter().flat_map(|vertex| vertex.to_le_bytes()));
             }
-            Self::Off => (["3 ", " ", " "], 0),
-            Self::Obj => (["f ", " ", " "], 1),
-            Self::Amf(_) => (["<triangle><v1>", "</v1><v2>", "</v2><v3>"], 0),
+            Self::Off => (["3 ", " ", " "], "\n", 0),
+            Self::Obj => (["f ", " ", " "], "\n", 1),
+            Self::Amf(_) => (["<triangle><v1>", "</v1><v2>", "</v2><v3>"], "</v3></triangle>\n", 0),
+            Self::ThreeMf(_) => (["<triangle v1=\"", "\" v2=\"", "\" v3=\""], "\"/>\n", 0),
         };
         for (before, vertex) in [a, b, c].into_iter().zip(face) {
             out.extend_from_slice(before.as_bytes());
             integer(u64::from(vertex) + from, out);
         }
-        out.extend_from_slice(if matches!(self, Self::Amf(_)) { b"</v3></triangle>\n" } else { b"\n" });
+        out.extend_from_slice(end.as_bytes());
     }
+}
+
+/// As the text of an XML element.
+fn escaped(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }
 
 /// The shortest decimal that reads back as the same number.
@@ -145,20 +170,17 @@ pub(crate) fn write(
     limits: &Limits,
     progress: &dyn Progress,
 ) -> Result<()> {
-    let file = emit::create(output).map_err(Error::io(output, "creating"))?;
-    let behind = WriteBehind::new(&file, limits).map_err(Error::io(output, "creating"))?;
-    let append = |bytes: &[u8]| behind.append(bytes).map_err(Error::io(output, "writing"));
     let Frame { head, between, tail } = layout.frame(mesh.vertices(), records, name);
-    append(head.as_bytes())?;
     let steps = Steps { records, output, progress };
-    parallel::in_pool(limits.threads, || {
+    let fill = |sink: &mut Sink<'_>| {
+        sink(head.as_bytes())?;
         let vertices = |range: Range<usize>| {
             let mut text = Vec::new();
             mesh.positions(range).for_each(|point| layout.vertex(point, &mut text));
             text
         };
-        steps.each(0, |pieces| pieces.into_par_iter().map(vertices).collect(), append)?;
-        append(between.as_bytes())?;
+        steps.each(0, |pieces| pieces.into_par_iter().map(vertices).collect(), sink)?;
+        sink(between.as_bytes())?;
         let mut cursor = mesh.cursor();
         let faces = |pieces: Vec<Range<usize>>| {
             // Numbers are read in order; their text is made side by side.
@@ -170,9 +192,23 @@ pub(crate) fn write(
             };
             numbers.into_par_iter().map(text).collect()
         };
-        steps.each(1, faces, append)
-    })?;
-    append(tail.as_bytes())?;
+        steps.each(1, faces, sink)?;
+        sink(tail.as_bytes())
+    };
+    parallel::in_pool(limits.threads, || match layout {
+        Layout::ThreeMf(_) => {
+            let most = MOST_AROUND + u64::from(mesh.vertices()) * MOST_A_VERTEX + records as u64 * MOST_A_TRIANGLE;
+            package::write(output, most, fill, limits, progress)
+        }
+        _ => to_file(output, fill, limits),
+    })
+}
+
+/// Writes what `fill` gives to the new file `output`.
+fn to_file(output: &Path, fill: impl FnOnce(&mut Sink<'_>) -> Result<()>, limits: &Limits) -> Result<()> {
+    let file = emit::create(output).map_err(Error::io(output, "creating"))?;
+    let behind = WriteBehind::new(&file, limits).map_err(Error::io(output, "creating"))?;
+    fill(&mut |bytes| behind.append(bytes).map_err(Error::io(output, "writing")))?;
     behind.finish().map_err(Error::io(output, "syncing"))?;
     if limits.defer_sync { Ok(()) } else { file.sync_all().map_err(Error::io(output, "syncing")) }
 }
@@ -190,7 +226,7 @@ impl Steps<'_> {
         &self,
         round: usize,
         mut make: impl FnMut(Vec<Range<usize>>) -> Vec<Vec<u8>> + Send,
-        take: impl Fn(&[u8]) -> Result<()> + Sync,
+        take: &mut Sink<'_>,
     ) -> Result<()> {
         let at_once = 2 * PIECE * rayon::current_num_threads();
         let mut waiting: Vec<Vec<u8>> = Vec::new();
@@ -212,10 +248,13 @@ impl Steps<'_> {
 
 #[cfg(test)]
 mod tests {
+    use std::io::Read;
+
     use proptest::prelude::*;
 
     use super::*;
     use crate::contract::progress::Quiet;
+    use crate::io::read::Archive;
     use crate::io::record::{self, Record};
 
     fn written(records: &[Record], layout: Layout) -> Vec<u8> {
@@ -245,6 +284,33 @@ mod tests {
     }
 
     #[test]
+    fn a_package_holds_the_text_of_a_model() {
+        let bytes = written(&two_triangles(), Layout::ThreeMf("inch"));
+        let archive = Archive::open(&bytes).map_err(|rejection| rejection.at(Path::new("a"))).unwrap();
+        let names: Vec<_> = archive.entries.iter().map(|entry| entry.name.as_str()).collect();
+        assert_eq!(names, ["[Content_Types].xml", "_rels/.rels", "3D/3dmodel.model"]);
+        let mut model = String::new();
+        let packed = &bytes[archive.entries[2].data.clone()];
+        flate2::read::DeflateDecoder::new(packed).read_to_string(&mut model).unwrap();
+        assert!(model.contains("<model unit=\"inch\"") && model.contains(">a &amp; b<"), "{model}");
+        let mesh = "<mesh>\n<vertices>\n<vertex x=\"0\" y=\"0\" z=\"0\"/>\n<vertex x=\"1.5\" y=\"0\" z=\"0\"/>\n\
+            <vertex x=\"0\" y=\"1e-7\" z=\"0\"/>\n<vertex x=\"0\" y=\"0\" z=\"2e20\"/>\n</vertices>\n<triangles>\n\
+            <triangle v1=\"0\" v2=\"1\" v3=\"2\"/>\n<triangle v1=\"2\" v2=\"1\" v3=\"3\"/>\n</triangles>\n</mesh>";
+        assert!(model.contains(mesh), "{model}");
+    }
+
+    /// Where the header before it has too few bytes for its sizes, a package is refused.
+    #[test]
+    fn no_vertex_and_no_triangle_is_longer_than_foreseen() {
+        let (layout, longest) = (Layout::ThreeMf("inch"), -1.175_494_4e-38);
+        let (mut vertex, mut triangle) = (Vec::new(), Vec::new());
+        layout.vertex([longest; 3], &mut vertex);
+        layout.face([u32::MAX; 3], &mut triangle);
+        assert!(vertex.len() as u64 <= MOST_A_VERTEX, "{}", vertex.len());
+        assert!(triangle.len() as u64 <= MOST_A_TRIANGLE, "{}", triangle.len());
+    }
+
+    #[test]
     fn ply_is_binary() {
         let ply = written(&two_triangles(), Layout::Ply);
         let head = b"property list uchar int vertex_indices\nend_header\n";
@@ -263,6 +329,7 @@ mod tests {
             decimal(value, &mut text);
             let back: f32 = std::str::from_utf8(&text).unwrap().parse().unwrap();
             prop_assert_eq!(back.to_bits(), bits);
+            prop_assert!(text.len() <= 16);
         }
     }
 }

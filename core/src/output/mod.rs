@@ -13,5 +13,6 @@ pub(crate) mod encode;
 pub(crate) mod incremental;
 pub(crate) mod indexed;
 pub(crate) mod model;
+mod package;
 pub(crate) mod readback;
 pub(crate) mod rows;

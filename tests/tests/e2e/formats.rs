@@ -94,10 +94,11 @@ fn the_format_of_a_result_can_be_chosen() {
     assert_is_mended(&forms::read("off", &place.read("part.off")), "an ending");
     // By an option, and by a profile, which also give the ending in a folder.
     place.repair("part.obj", "fixed", &["--format", "ply"]).expect(0);
+    place.repair("part.obj", "fixed", &["--format", "3mf"]).expect(0);
     place.repair("part.obj", "fixed", &["--profile", "amf.toml"]).expect(0);
     place.repair("part.obj", "fixed", &[]).expect(0);
-    assert_eq!(place.names("fixed"), ["part.amf", "part.obj", "part.ply"]);
-    for ending in ["amf", "obj", "ply"] {
+    assert_eq!(place.names("fixed"), ["part.3mf", "part.amf", "part.obj", "part.ply"]);
+    for ending in ["3mf", "amf", "obj", "ply"] {
         assert_is_mended(&forms::read(ending, &place.read(&format!("fixed/part.{ending}"))), ending);
     }
     // A clean file of another format is written anew.
@@ -107,7 +108,7 @@ fn the_format_of_a_result_can_be_chosen() {
     let written: Vec<_> = stl::records(&place.read("clean.stl")).iter().map(stl::corners).collect();
     assert_eq!(written, solid_box());
     let ran = place.suture(["repair", "part.obj", "-o", "x.obj", "--format", "step"]).expect(2);
-    assert!(ran.stderr().contains("stl, ply, off, obj, amf"), "{}", ran.stderr());
+    assert!(ran.stderr().contains("stl, 3mf, ply, off, obj, amf"), "{}", ran.stderr());
 }
 
 #[test]
@@ -116,7 +117,7 @@ fn conversion_there_and_back_gives_the_same_corners() {
     // Two boxes that cross, one of them open: nothing of that is repaired.
     let triangles = [open_box(), stl::cuboid([5.0, 5.0, 5.0], [50.0, 6.0, 1e-3])].concat();
     place.put("part.stl", &stl::mesh(&triangles));
-    for [from, to] in [["stl", "ply"], ["ply", "off"], ["off", "obj"], ["obj", "amf"], ["amf", "stl"]] {
+    for [from, to] in [["stl", "ply"], ["ply", "off"], ["off", "obj"], ["obj", "amf"], ["amf", "3mf"], ["3mf", "stl"]] {
         let [input, output] = [format!("part.{from}"), format!("{}.{to}", if to == "stl" { "back" } else { "part" })];
         let ran = place.suture(["convert", &input, &output]).expect(0);
         assert!(ran.stdout().contains("23 triangles"), "{}", ran.stdout());
@@ -128,13 +129,38 @@ fn conversion_there_and_back_gives_the_same_corners() {
     assert_eq!(back, triangles);
     place.suture(["convert", "part.obj", "copy.obj"]).expect(0);
     assert_eq!(place.read("copy.obj"), place.read("part.obj"));
-    // Nothing is replaced unasked, and nothing becomes a 3MF.
+    // Nothing is replaced unasked, and nothing becomes a format that is only known by name.
     let before = place.read("part.ply");
     place.suture(["convert", "back.stl", "part.ply"]).expect(2);
     assert_eq!(place.read("part.ply"), before);
-    let ran = place.suture(["convert", "back.stl", "part.3mf"]).expect(2);
-    assert!(ran.stderr().contains("stl, ply, off, obj, amf"), "{}", ran.stderr());
-    assert!(!place.at("part.3mf").exists());
+    let ran = place.suture(["convert", "back.stl", "part.step"]).expect(2);
+    assert!(ran.stderr().contains("stl, 3mf, ply, off, obj, amf"), "{}", ran.stderr());
+    assert!(!place.at("part.step").exists());
+}
+
+#[test]
+fn a_mesh_becomes_a_package_and_what_3mf_does_not_allow_does_not() {
+    let place = Place::new();
+    // Feet are called otherwise in a 3MF.
+    let amf = String::from_utf8(forms::write(Form::Amf, &open_box())).unwrap();
+    place.put("part.amf", amf.replace("unit=\"millimeter\"", "unit=\"feet\"").as_bytes());
+    let report = place.repair("part.amf", "part.3mf", &[]).expect(0).report();
+    assert_eq!([&report["output"]["format"], &report["output"]["unit"]], ["3mf", "foot"], "{report}");
+    assert_is_mended(&forms::read("3mf", &place.read("part.3mf")), "a package");
+    let names: Vec<_> = zip::read(&place.read("part.3mf")).into_iter().map(|entry| entry.name).collect();
+    assert_eq!(names, ["[Content_Types].xml", "_rels/.rels", "3D/3dmodel.model"]);
+    // A package that is good stays, by whatever name of its format.
+    place.repair("part.3mf", "again.3mf", &["--format", "3mf"]).expect(0);
+    assert_eq!(place.read("again.3mf"), place.read("part.3mf"));
+
+    let mut pinched = solid_box();
+    pinched.push([pinched[0][0], pinched[0][1], pinched[0][0]]);
+    place.put("pinched.stl", &stl::mesh(&pinched));
+    let ran = place.suture(["convert", "pinched.stl", "pinched.3mf"]).expect(2);
+    assert!(ran.stderr().contains("1 triangle with two corners at one place"), "{}", ran.stderr());
+    assert!(!place.at("pinched.3mf").exists());
+    place.repair("pinched.stl", "pinched.3mf", &[]).expect(0);
+    assert_eq!(forms::read("3mf", &place.read("pinched.3mf")), solid_box());
 }
 
 #[test]
@@ -157,12 +183,16 @@ fn a_package_is_converted_as_it_is_built() {
 #[test]
 fn a_hot_folder_takes_each_format() {
     let place = Place::new();
-    place.put("suture.toml", b"settle = \"50ms\"\n[[folders]]\npath = \"hot\"\n[profiles.plain]\nformat = \"stl\"\n");
+    place.put(
+        "suture.toml",
+        b"settle = \"50ms\"\n[[folders]]\npath = \"hot\"\n[profiles.plain]\nformat = \"stl\"\n[profiles.packed]\nformat = \"3mf\"\n",
+    );
     for form in [Form::PlyBinary, Form::Off, Form::Obj, Form::Amf, Form::ThreeMf] {
         place.put(&format!("hot/in/{form:?}.{}", form.ending()), &forms::write(form, &open_box()));
     }
     place.put("hot/in/plain/part.obj", &forms::write(Form::Obj, &open_box()));
     place.put("hot/in/plain/CLEAN.PLY", &forms::write(Form::PlyText, &solid_box()));
+    place.put("hot/in/packed/part.obj", &forms::write(Form::Obj, &open_box()));
     // A sheet is no solid: its best attempt is of its format.
     place.put("hot/in/sheet.off", &forms::write(Form::Off, &solid_box()[..2]));
     place.put("hot/in/part.step", b"ISO-10303-21;");
@@ -171,8 +201,9 @@ fn a_hot_folder_takes_each_format() {
         place.names(folder).into_iter().filter(|name| !name.ends_with(".json") && !name.starts_with('.')).collect()
     };
     let mended = ["Amf.amf", "Obj.obj", "Off.off", "PlyBinary.ply", "ThreeMf.3mf"];
-    assert_eq!(meshes("hot/out"), [&mended[..], &["plain/CLEAN.stl", "plain/part.stl"]].concat());
-    assert_eq!(meshes("hot/done"), [&mended[..], &["plain/CLEAN.PLY", "plain/part.obj"]].concat());
+    assert_eq!(meshes("hot/out"), [&mended[..], &["packed/part.3mf", "plain/CLEAN.stl", "plain/part.stl"]].concat());
+    assert_eq!(meshes("hot/done"), [&mended[..], &["packed/part.obj", "plain/CLEAN.PLY", "plain/part.obj"]].concat());
+    assert_is_mended(&forms::read("3mf", &place.read("hot/out/packed/part.3mf")), "packed");
     for name in mended {
         let ending = name.rsplit_once('.').unwrap().1;
         assert_is_mended(&forms::read(ending, &place.read(&format!("hot/out/{name}"))), name);

@@ -147,13 +147,7 @@ impl<'a> Maker<'a> {
         };
         let written = model::write(text, units, new.at, &mut sink)?;
         new.at = written.at;
-        // Sets refer to triangles by their numbers, which are others now.
-        if let Some(sets) = self.package.sets_at(place) {
-            let before = text.text.get(new.at..sets.start).unwrap_or_default();
-            before.chunks(1 << 20).try_for_each(&mut sink)?;
-            new.at = sets.end;
-            self.objects_without_sets += 1;
-        }
+        self.objects_without_sets += u64::from(written.is_without_sets);
         self.account.add(written.account);
         let mut at = 0;
         for (volume, triangles) in self.package.volumes_at(place).into_iter().zip(&written.triangles) {
@@ -215,7 +209,7 @@ fn records_of<'r>(unit: &UnitOf, read: &'r MeshRecords) -> &'r [Record] {
 
 fn mesh_text<'t>(package: &'t PackageFile, place: Place, read: &'t MeshRecords) -> MeshText<'t> {
     let (text, vertices_within, triangles) = package.mesh_at(place);
-    MeshText { text, vertices_within, triangles, vertices: read.vertices() }
+    MeshText { text, vertices_within, triangles, vertices: read.vertices(), sets: package.sets_at(place) }
 }
 
 fn what_became<'u>(unit: &UnitOf, mended: Option<&'u Mended>) -> Unit<'u> {

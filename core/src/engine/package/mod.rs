@@ -16,7 +16,8 @@ use std::path::Path;
 
 use crate::contract::error::{Error, Result};
 use crate::contract::report::{FileFacts, Format, Outcome, Report, Task};
-use crate::contract::settings::{KeepAttributes, OutputFormat, Profile, folder_of};
+use crate::contract::settings::{OutputFormat, Profile, folder_of};
+use crate::engine::carried;
 use crate::engine::clock::Clock;
 use crate::engine::files;
 use crate::engine::formats;
@@ -63,7 +64,7 @@ pub(crate) fn inspect(package: &PackageFile, work: Work<'_>, clock: &mut Clock) 
 /// # Errors
 /// [`Error`], any of them.
 pub(crate) fn repair_as(package: &PackageFile, output: &Path, work: Work<'_>, clock: &mut Clock) -> Result<Report> {
-    if work.profile.format == OutputFormat::Input {
+    if matches!(work.profile.format, OutputFormat::Input | OutputFormat::ThreeMf) {
         return repair(package, output, work, clock);
     }
     let spool = Nameless::new(work.limits)?;
@@ -126,39 +127,25 @@ fn judge(package: &PackageFile, changed: &Changed, report: &mut Report, profile:
     if report.outcome == Outcome::Clean {
         report.outcome = Outcome::Repaired;
     }
-    let mut concerns = Vec::new();
-    if package.is_signed() {
-        concerns.push("the package is signed, and no signature holds of a package that was changed".to_owned());
+    let sets = Counted(changed.objects_without_sets, "object", "objects");
+    if changed.objects_without_sets > 0 {
+        report.input.findings.push(format!(
+            "sets of triangles of {sets} are left out: there are too many, or they are in a form that is not understood"
+        ));
     }
     let triangles = changed.account.lost + changed.account.approximated;
-    let harmed = triangles + changed.objects_without_sets;
-    let sets = Counted(changed.objects_without_sets, "object", "objects");
-    let words = || match changed.objects_without_sets {
-        0 => format!("colours, paint or other attributes of {} are lost or only about right", words::triangles(triangles)),
-        _ => format!(
+    let harm = match changed.objects_without_sets {
+        0 => carried::harm(changed.account),
+        _ => Some(format!(
             "attributes of {} are lost or only about right, and sets of triangles of {sets} are left out",
             words::triangles(triangles)
-        ),
+        )),
     };
-    if changed.objects_without_sets > 0 {
-        report
-            .input
-            .findings
-            .push(format!("sets of triangles of {sets} are left out: they name triangles by numbers, which are others now"));
+    if !carried::heed(report, profile, harm) {
+        return false;
     }
-    match profile.attributes {
-        KeepAttributes::Refuse if harmed > 0 => {
-            report.outcome = Outcome::NotGood;
-            report.verdict.good = false;
-            report.verdict.reasons.insert(0, format!("{}: the profile `{}` refuses that", words(), profile.name));
-            return false;
-        }
-        KeepAttributes::Keep if harmed > 0 => concerns.push(words()),
-        _ => {}
-    }
-    if !concerns.is_empty() && report.outcome.is_good() {
-        report.outcome = Outcome::NeedsReview;
-        report.verdict.reasons.splice(0..0, concerns);
+    if package.is_signed() {
+        carried::ask_for_review(report, "the package is signed, and no signature holds of a package that was changed".into());
     }
     true
 }

@@ -104,7 +104,7 @@ impl PackageFile {
         }
     }
 
-    /// Where the sets of an object's triangles stand in the text of its part, if it has any (3MF Triangle Sets Extension 1.0).
+    /// Where the sets of an object's triangles stand in the text of its part, if it has any (3MF Core 1.3, section 4.1: Triangle Sets).
     pub(crate) fn sets_at(&self, place: Place) -> Option<Range<usize>> {
         const NAME: &[u8] = b"trianglesets";
         let Content::Mesh(mesh) = &self.model.object(place)?.content else { return None };

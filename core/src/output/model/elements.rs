@@ -7,6 +7,8 @@ use std::ops::Range;
 /// One `<triangle …/>`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Element<'t> {
+    /// Its number among the elements that were asked for.
+    pub(crate) number: u32,
     /// Where it stands in the text, from `<` to the end of the tag that closes it.
     pub(crate) whole: Range<usize>,
     /// Its name with its prefix.
@@ -29,18 +31,30 @@ pub(crate) fn local(name: &[u8]) -> &[u8] {
     name.iter().position(|byte| *byte == b':').map_or(name, |colon| name.get(colon + 1..).unwrap_or_default())
 }
 
+/// A tag.
+pub(crate) enum Tag<'t> {
+    /// That an element begins with.
+    Start(Element<'t>),
+    /// All of an element.
+    Empty(Element<'t>),
+    /// That an element of this name ends with, and where it stands.
+    End(&'t [u8], Range<usize>),
+}
+
 /// The triangles within a stretch of a text, in order.
 #[derive(Clone)]
 pub(crate) struct Elements<'t> {
     text: &'t [u8],
     at: usize,
     end: usize,
+    /// So many were given.
+    count: u32,
 }
 
 impl<'t> Elements<'t> {
     /// Those between the tags of a `<triangles>`.
     pub(crate) fn within(text: &'t [u8], range: Range<usize>) -> Self {
-        Self { text, at: range.start, end: range.end.min(text.len()) }
+        Self { text, at: range.start, end: range.end.min(text.len()), count: 0 }
     }
 
     fn rest(&self) -> &'t [u8] {
@@ -59,7 +73,7 @@ impl<'t> Elements<'t> {
         let begin = self.at;
         self.at += 1;
         let name = self.word();
-        let mut element = Element { whole: begin..begin, name, vertices: [u32::MAX; 3], attributes: Vec::new() };
+        let mut element = Element { number: 0, whole: begin..begin, name, vertices: [u32::MAX; 3], attributes: Vec::new() };
         loop {
             self.skip_blanks();
             match self.rest() {
@@ -122,8 +136,29 @@ impl<'t> Elements<'t> {
     /// The next element of this name, whatever its prefix.
     pub(crate) fn next_called(&mut self, name: &[u8]) -> Option<Element<'t>> {
         loop {
+            let (mut element, is_closed) = match self.next_tag()? {
+                Tag::Start(element) => (element, false),
+                Tag::Empty(element) => (element, true),
+                Tag::End(..) => continue,
+            };
+            if local(element.name) != name {
+                continue;
+            }
+            if !is_closed && self.skip_past(b"</") && self.skip_past(b">") {
+                element.whole.end = self.at;
+            }
+            element.number = self.count;
+            self.count = self.count.saturating_add(1);
+            return Some(element);
+        }
+    }
+
+    /// The next tag. `None` at the end, and for ever where one is not understood.
+    pub(crate) fn next_tag(&mut self) -> Option<Tag<'t>> {
+        loop {
             let length = self.rest().iter().position(|byte| *byte == b'<')?;
             self.at += length;
+            let begin = self.at;
             match self.rest() {
                 [b'<', b'!', b'-', b'-', ..] => {
                     self.skip_past(b"-->");
@@ -132,20 +167,26 @@ impl<'t> Elements<'t> {
                     self.skip_past(b"?>");
                 }
                 [b'<', b'/', ..] => {
+                    self.at += 2;
+                    let name = self.word();
                     self.skip_past(b">");
+                    return Some(Tag::End(name, begin..self.at));
                 }
                 _ => {
-                    let (mut element, is_closed) = self.tag()?;
-                    if local(element.name) != name {
-                        continue;
+                    let tag = self.tag();
+                    if tag.is_none() {
+                        self.at = begin;
                     }
-                    if !is_closed && self.skip_past(b"</") && self.skip_past(b">") {
-                        element.whole.end = self.at;
-                    }
-                    return Some(element);
+                    let (element, is_closed) = tag?;
+                    return Some(if is_closed { Tag::Empty(element) } else { Tag::Start(element) });
                 }
             }
         }
+    }
+
+    /// There is no tag any more, not even one that is not understood.
+    pub(crate) fn is_at_end(&self) -> bool {
+        !self.rest().contains(&b'<')
     }
 }
 
@@ -169,6 +210,7 @@ mod tests {
         let inner = 11..text.len() - 12;
         let all: Vec<_> = Elements::within(text, inner).collect();
         assert_eq!(all.len(), 2);
+        assert_eq!([all[0].number, all[1].number], [0, 1]);
         assert_eq!(all[0].vertices, [0, 1, 2]);
         assert_eq!(all[0].attributes, [(&b"pid"[..], &b"5"[..]), (b"s:paint", b"8")]);
         assert_eq!(all[0].value(b"paint"), Some(&b"8"[..]));

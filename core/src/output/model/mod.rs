@@ -1,15 +1,16 @@
 //! A mesh in a 3MF model part, written as a repair left it.
 //!
 //! **In:** the text of the part, and what became of the mesh's triangles.
-//! **Out:** the text with new vertices behind the old ones, and the triangles of the output.
+//! **Out:** the text with new vertices behind the old ones, the triangles of the output, and sets of triangles with their new numbers.
 //! **Promise:** whatever is not of a triangle or a vertex that changed stays byte for byte. A triangle that is untouched keeps its attributes, one that
-//! was cut hands them to its parts, a new one takes those of most of its rim.
+//! was cut hands them to its parts, a new one takes those of most of its rim. So it is with the sets that it is in.
 //!
 //! By the 3MF Core Specification 1.3, sections 4.1 and 5.1.3; paint by [`crate::attributes::paint`].
 
 mod elements;
 mod inherit;
 mod plan;
+mod sets;
 mod votes;
 
 use std::collections::BTreeSet;
@@ -23,6 +24,7 @@ use inherit::Attribute;
 pub(crate) use inherit::weights;
 pub(crate) use plan::{Change, Fate, MeshText, Unit};
 use plan::{Plan, UnitPlan};
+use sets::{IN_NONE, Runs, Sets};
 
 /// Bytes of text that are given on at once.
 const BATCH: usize = 256 << 10;
@@ -60,6 +62,8 @@ pub(crate) struct Written {
     pub(crate) account: Account,
     /// The triangles of each unit.
     pub(crate) triangles: Vec<u64>,
+    /// Its sets of triangles are left out: there are too many, or they are in a form that is not understood.
+    pub(crate) is_without_sets: bool,
 }
 
 /// Does each triangle of these units refer to the vertex that [`write()`] would have it refer to?
@@ -68,7 +72,7 @@ pub(crate) fn is_numbered_once(mesh: &MeshText<'_>, units: &[Unit<'_>]) -> bool 
     mesh.elements().all(|element| plan.canonical(element.vertices) == element.vertices)
 }
 
-/// Writes the text from byte `at` on to the end of the triangles of `mesh`, which are in these units. O(n) in the triangles.
+/// Writes the text from byte `at` on to the end of the triangles of `mesh`, which are in these units, and of their sets. O(n) in the triangles.
 ///
 /// # Errors
 /// Those of `sink`.
@@ -79,8 +83,21 @@ pub(crate) fn write(
     sink: &mut dyn FnMut(&[u8]) -> Result<()>,
 ) -> Result<Written> {
     let plan = Plan::of(mesh, units);
-    let mut writer =
-        Writer { mesh, plan: &plan, at, seen: 0, batch: Vec::new(), result: Ok(()), sink, account: Account::default(), count: 0 };
+    let came = u32::try_from(units.iter().map(|unit| unit.triangles).sum::<usize>()).unwrap_or(u32::MAX);
+    let sets = mesh.sets.clone().and_then(|range| Sets::parse(mesh.text, range, came));
+    let mut writer = Writer {
+        mesh,
+        plan: &plan,
+        sets: sets.as_ref(),
+        at,
+        seen: 0,
+        batch: Vec::new(),
+        result: Ok(()),
+        sink,
+        account: Account::default(),
+        count: 0,
+        runs: Runs::default(),
+    };
     writer.vertices();
     let mut elements = mesh.elements();
     let mut triangles = Vec::new();
@@ -93,14 +110,17 @@ pub(crate) fn write(
         triangles.push(writer.count);
     }
     writer.copy_to(mesh.triangles.end);
+    let is_without_sets = !writer.sets();
     writer.flush();
     writer.result?;
-    Ok(Written { at: mesh.triangles.end, account: writer.account, triangles })
+    Ok(Written { at: writer.at, account: writer.account, triangles, is_without_sets })
 }
 
 struct Writer<'w, 't> {
     mesh: &'w MeshText<'t>,
     plan: &'w Plan<'t>,
+    /// Of the triangles, if they are understood.
+    sets: Option<&'w Sets<'t>>,
     /// Up to here, the text is written.
     at: usize,
     /// Up to here, its triangles are dealt with: those that stay are copied when one that does not stay follows.
@@ -113,6 +133,8 @@ struct Writer<'w, 't> {
     account: Account,
     /// Triangles of the unit so far.
     count: u64,
+    /// The classes of all triangles so far, by the sets that they are in.
+    runs: Runs,
 }
 
 impl Writer<'_, '_> {
@@ -183,7 +205,8 @@ impl Writer<'_, '_> {
             change.each(|fate| has |= matches!(fate, Fate::New(_)));
             has
         };
-        let new = if has_new() { votes::count(self.mesh, self.plan, unit, change, &mut elements.clone()) } else { Vec::new() };
+        let voters = || votes::count((self.mesh, self.sets), self.plan, unit, change, &mut elements.clone());
+        let new = if has_new() { voters() } else { Vec::new() };
         let name = elements.clone().next().map_or(b"triangle".to_vec(), |element| element.name.to_vec());
         let mut used = BTreeSet::new();
         let (mut faces, mut k) = (unit.faces.iter(), 0);
@@ -216,12 +239,12 @@ impl Writer<'_, '_> {
                         let count = if inherited.is_exact { &mut self.account.divided } else { &mut self.account.approximated };
                         *count += 1;
                     }
-                    self.add(element.name, face, &inherited.attributes);
+                    self.add(element.name, face, &inherited.attributes, self.class_of(element));
                 }
                 Fate::New(_) => {
-                    let attributes = new.get(k - 1).cloned().unwrap_or_default();
+                    let (attributes, class) = new.get(k - 1).cloned().unwrap_or_default();
                     self.account.inherited += u64::from(!attributes.is_empty());
-                    self.add(&name, face, &attributes);
+                    self.add(&name, face, &attributes, class);
                 }
             }
         });
@@ -238,7 +261,7 @@ impl Writer<'_, '_> {
     fn stay(&mut self, element: &Element<'_>, vertices: [u32; 3]) {
         if self.plan.placed(vertices) == element.vertices {
             self.seen = element.whole.end;
-            self.count += 1;
+            self.count_one(self.class_of(element));
         } else {
             self.replace(element, vertices, &inherit::all(element));
         }
@@ -259,6 +282,7 @@ impl Writer<'_, '_> {
     fn replace(&mut self, element: &Element<'_>, vertices: [u32; 3], attributes: &[Attribute]) {
         self.copy_to(element.whole.start);
         self.put_triangle(element.name, vertices, attributes);
+        self.count_one(self.class_of(element));
         self.pass(element);
     }
 
@@ -268,10 +292,31 @@ impl Writer<'_, '_> {
     }
 
     /// Writes a triangle behind those that were dealt with.
-    fn add(&mut self, name: &[u8], vertices: [u32; 3], attributes: &[Attribute]) {
+    fn add(&mut self, name: &[u8], vertices: [u32; 3], attributes: &[Attribute], class: u32) {
         self.copy_to(self.seen);
         self.put(b"\n");
         self.put_triangle(name, vertices, attributes);
+        self.count_one(class);
+    }
+
+    /// Counts a triangle that is in the sets of this class.
+    fn count_one(&mut self, class: u32) {
+        self.count += 1;
+        self.runs.push(class);
+    }
+
+    /// The class of a triangle of the text.
+    fn class_of(&self, element: &Element<'_>) -> u32 {
+        self.sets.map_or(IN_NONE, |sets| sets.class_of(element.number))
+    }
+
+    /// Writes the sets; `false`: they are left out.
+    fn sets(&mut self) -> bool {
+        let Some(range) = self.mesh.sets.clone() else { return true };
+        self.copy_to(range.start);
+        self.at = range.end;
+        let (sets, runs) = (self.sets, std::mem::take(&mut self.runs));
+        sets.and_then(|sets| sets.write(&runs, &mut |bytes| self.put(bytes))).is_some()
     }
 
     fn put_triangle(&mut self, name: &[u8], vertices: [u32; 3], attributes: &[Attribute]) {
@@ -290,7 +335,6 @@ impl Writer<'_, '_> {
         }
         tag.extend_from_slice(b"/>");
         self.put(&tag);
-        self.count += 1;
     }
 }
 

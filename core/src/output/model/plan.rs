@@ -23,6 +23,8 @@ pub(crate) struct MeshText<'t> {
     /// What stands between the tags of the triangles.
     pub(crate) triangles: Range<usize>,
     pub(crate) vertices: Vertices<'t>,
+    /// Where sets of the triangles stand, if there are any; behind the triangles.
+    pub(crate) sets: Option<Range<usize>>,
 }
 
 impl<'t> MeshText<'t> {

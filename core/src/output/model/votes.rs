@@ -1,10 +1,11 @@
-//! The attributes of new triangles: those that most of the rim around them has, by its length.
+//! The attributes of new triangles, and the sets that they are in: those that most of the rim around them has, by its length.
 
 use std::collections::{BTreeMap, HashMap};
 
 use super::elements::{Element, Elements, local};
 use super::inherit::{self, Attribute};
 use super::plan::{Change, Fate, MeshText, Plan, UnitPlan};
+use super::sets::{IN_NONE, Sets};
 use crate::attributes::paint::Paint;
 use crate::util::bits;
 use crate::util::union_find;
@@ -16,11 +17,17 @@ struct Ballot {
     length: f64,
     /// By the attribute that is asked for, then by what it would be.
     choices: BTreeMap<Vec<u8>, BTreeMap<Vec<Attribute>, f64>>,
+    /// By the class of sets.
+    classes: BTreeMap<u32, f64>,
 }
 
+/// Attributes that new triangles take, and the class of the sets that they are in.
+pub(super) type Taken = (Vec<Attribute>, u32);
+
 impl Ballot {
-    fn vote(&mut self, attributes: &[(Vec<u8>, Vec<Attribute>)], length: f64) {
+    fn vote(&mut self, attributes: &[(Vec<u8>, Vec<Attribute>)], class: u32, length: f64) {
         self.length += length;
+        *self.classes.entry(class).or_default() += length;
         for (asked, choice) in attributes {
             let choices = self.choices.entry(asked.clone()).or_default();
             *choices.entry(choice.clone()).or_default() += length;
@@ -32,14 +39,26 @@ impl Ballot {
         let mut all = Vec::new();
         for choices in self.choices.values() {
             let without = self.length - choices.values().sum::<f64>();
-            let best = choices.iter().fold(None, |best: Option<(&Vec<Attribute>, f64)>, (choice, length)| match best {
-                Some((_, most)) if most >= *length => best,
-                _ => Some((choice, *length)),
-            });
-            all.extend(best.filter(|(_, length)| *length >= without).into_iter().flat_map(|(choice, _)| choice.iter().cloned()));
+            let best = longest(choices.iter()).filter(|(_, length)| *length >= without);
+            all.extend(best.into_iter().flat_map(|(choice, _)| choice.iter().cloned()));
         }
         all
     }
+
+    /// The class of sets that wins; that of none where most of the rim is in none.
+    fn class(&self) -> u32 {
+        let without = self.classes.get(&IN_NONE).copied().unwrap_or_default();
+        let best = longest(self.classes.iter().filter(|(class, _)| **class != IN_NONE)).filter(|(_, length)| *length >= without);
+        best.map_or(IN_NONE, |(class, _)| *class)
+    }
+}
+
+/// The choice of the most length; the first of equals.
+fn longest<'c, C>(choices: impl Iterator<Item = (&'c C, &'c f64)>) -> Option<(&'c C, f64)> {
+    choices.fold(None, |best: Option<(&C, f64)>, (choice, length)| match best {
+        Some((_, most)) if most >= *length => best,
+        _ => Some((choice, *length)),
+    })
 }
 
 /// The groups of new triangles of a unit that hang together.
@@ -53,14 +72,14 @@ struct Groups {
     ballots: Vec<Ballot>,
 }
 
-/// The attributes of the new triangles of a unit, by place among the faces of its plan. O(n) in its triangles.
+/// What the new triangles of a unit take, by place among the faces of its plan. O(n) in its triangles.
 pub(super) fn count<'t>(
-    mesh: &MeshText<'t>,
+    (mesh, sets): (&MeshText<'t>, Option<&Sets<'t>>),
     plan: &Plan<'t>,
     unit: &UnitPlan<'t>,
     change: &Change<'_>,
     elements: &mut Elements<'t>,
-) -> Vec<Vec<Attribute>> {
+) -> Vec<Taken> {
     let mut groups = Groups::of(change, unit, mesh.vertices.len() + plan.fresh.len());
     let mut faces = unit.faces.iter();
     change.each(|fate| {
@@ -86,9 +105,9 @@ pub(super) fn count<'t>(
                 return;
             }
         };
-        groups.ask(vertices, &element, |vertex| plan.position(mesh, vertex));
+        groups.ask(vertices, (&element, sets), |vertex| plan.position(mesh, vertex));
     });
-    let winners: Vec<_> = groups.ballots.iter().map(Ballot::winners).collect();
+    let winners: Vec<Taken> = groups.ballots.iter().map(|ballot| (ballot.winners(), ballot.class())).collect();
     let of = |group: &Option<u32>| group.and_then(|group| winners.get(group as usize)).cloned().unwrap_or_default();
     groups.of_face.iter().map(of).collect()
 }
@@ -127,7 +146,12 @@ impl Groups {
     }
 
     /// Lets a triangle that stays speak for each of its edges that is one of the rim.
-    fn ask(&mut self, vertices: [u32; 3], element: &Element<'_>, position: impl Fn(u32) -> [f32; 3]) {
+    fn ask(
+        &mut self,
+        vertices: [u32; 3],
+        (element, sets): (&Element<'_>, Option<&Sets<'_>>),
+        position: impl Fn(u32) -> [f32; 3],
+    ) {
         let at_rim = vertices.iter().filter(|vertex| bits::holds(&self.vertices, **vertex as usize)).count();
         if at_rim < 2 {
             return;
@@ -137,7 +161,9 @@ impl Groups {
             let Some(ballot) = self.of_edge.get(&edge).and_then(|group| self.ballots.get_mut(*group as usize)) else { continue };
             let [a, b] = edge.map(|vertex| position(vertex).map(f64::from));
             let length = [0, 1, 2].map(|k| (a[k] - b[k]) * (a[k] - b[k])).iter().sum::<f64>().sqrt();
-            ballot.vote(choices.get_or_insert_with(|| of_one_kind(element)), length);
+            let class = || sets.map_or(IN_NONE, |sets| sets.class_of(element.number));
+            let (attributes, class) = choices.get_or_insert_with(|| (of_one_kind(element), class()));
+            ballot.vote(attributes, *class, length);
         }
     }
 }

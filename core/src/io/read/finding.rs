@@ -45,6 +45,8 @@ pub(crate) enum Rejection {
     Unreadable(String),
     /// More triangles than a binary STL can count.
     TooMany,
+    /// More triangles than this by objects that are placed again and again.
+    Copies(u64),
 }
 
 impl Rejection {
@@ -55,6 +57,11 @@ impl Rejection {
                 path: path.to_owned(),
                 reason: format!("more than {} triangles", Count(MAX_TRIANGLES)),
                 advice: "split it, for no binary STL can count them".into(),
+            },
+            Self::Copies(most) => Error::Refused {
+                path: path.to_owned(),
+                reason: format!("its objects are placed so often that they are more than {} triangles", Count(most)),
+                advice: "let it place fewer copies".into(),
             },
         }
     }

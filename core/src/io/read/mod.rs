@@ -16,6 +16,8 @@ mod faces;
 mod facets;
 mod finding;
 mod foreign;
+#[cfg(fuzzing)]
+pub mod fuzzing;
 mod limits;
 mod mesh_file;
 mod number;

@@ -22,8 +22,8 @@ const QUEUE: usize = 16;
 /// Steps that the predicates of one corner count for.
 const PREDICATES: usize = 4;
 
-/// Cuts the polygon with these corners, more than three of them.
-pub(super) fn clip(flat: impl Iterator<Item = Coord<f64>>, mut take: impl FnMut([usize; 3])) {
+/// Cuts the polygon with these corners, more than three of them. `false`: it took too long, and its last triangles are a fan.
+pub(super) fn clip(flat: impl Iterator<Item = Coord<f64>>, mut take: impl FnMut([usize; 3])) -> bool {
     let mut polygon = Polygon::of(flat.collect());
     for _ in 3..polygon.corners.len() {
         let Some(ear) = polygon.next_ear() else { break };
@@ -37,7 +37,7 @@ pub(super) fn clip(flat: impl Iterator<Item = Coord<f64>>, mut take: impl FnMut(
     loop {
         let next = polygon.corner(last).after;
         if next == first {
-            return;
+            return polygon.patience > 0;
         }
         take([first, last, next].map(|place| place as usize));
         last = next;

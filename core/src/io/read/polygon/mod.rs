@@ -4,8 +4,9 @@
 //!
 //! **Out:** n - 2 triangles for n corners, in the polygon's direction.
 //!
-//! **Promise:** of a polygon that does not cross itself, no triangle overlaps another or has the wrong direction; corners that repeat and edges that
-//! go back on themselves cost triangles without area. Of every other polygon the triangles are the same each time.
+//! **Promise:** of a polygon that does not cross itself and has no more than 2^17 corners, no triangle overlaps another or has the wrong direction;
+//! corners that repeat and edges that go back on themselves cost triangles without area. Of every other polygon the triangles are the same each time;
+//! where some of them are a fan that may lie outside, the caller is told. Work and memory are bounded for each polygon.
 //!
 //! The polygon is looked at along the axis that is nearest to its normal (M. E. Newell's, in I. E. Sutherland, R. F. Sproull, R. A. Schumacker,
 //! "A characterization of ten hidden-surface algorithms", 1974). Coordinates stay as they are, so that predicates decide exactly.
@@ -19,23 +20,40 @@ use robust::{Coord, orient2d};
 
 use crate::io::record::Point;
 
+/// Corners of a polygon that is clipped, at most: beyond them it becomes a fan, for want of memory. Real files have faces of some thousands.
+const MOST_CLIPPED: usize = 1 << 17;
+
+/// Whether the triangles of a polygon cover it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Cut {
+    /// As far as any can.
+    Whole,
+    /// Some are a fan that may lie outside of it: it has no plane, crosses itself too much, or has too many corners.
+    Fan,
+}
+
 /// Calls `take` with the corners of each triangle, as places in `polygon`, in the polygon's direction; n - 2 of them for n corners.
 ///
 /// A convex polygon becomes a fan from its first corner, as most readers have it. O(n log n) for the polygons of real files; at most about
-/// 64 n log n steps, or 2^26, for any, and 128 bytes per corner.
-pub(super) fn cut(polygon: &[Point], mut take: impl FnMut([usize; 3])) {
-    match Plane::of(polygon) {
-        Some(plane) if polygon.len() > 3 => match *polygon {
-            [a, b, c, d] => quad([a, b, c, d].map(|corner| plane.flat(corner))).into_iter().for_each(take),
-            _ if is_convex(polygon, plane) => fan(polygon.len(), take),
-            _ => ears::clip(polygon.iter().map(|corner| plane.flat(*corner)), take),
-        },
-        _ => fan(polygon.len(), &mut take),
+/// 64 n log n steps, or 2^26, for any, and 128 bytes per corner of those that are clipped.
+pub(super) fn cut(polygon: &[Point], take: impl FnMut([usize; 3])) -> Cut {
+    let plane = Plane::of(polygon).filter(|_| polygon.len() > 3);
+    match (plane, polygon) {
+        (Some(plane), &[a, b, c, d]) => {
+            quad([a, b, c, d].map(|corner| plane.flat(corner))).into_iter().for_each(take);
+            Cut::Whole
+        }
+        (Some(plane), _) if is_convex(polygon, plane) => fan(polygon.len(), take, Cut::Whole),
+        (Some(plane), _) if polygon.len() <= MOST_CLIPPED => {
+            if ears::clip(polygon.iter().map(|corner| plane.flat(*corner)), take) { Cut::Whole } else { Cut::Fan }
+        }
+        _ => fan(polygon.len(), take, if polygon.len() > 3 { Cut::Fan } else { Cut::Whole }),
     }
 }
 
-fn fan(corners: usize, take: impl FnMut([usize; 3])) {
+fn fan(corners: usize, take: impl FnMut([usize; 3]), cut: Cut) -> Cut {
     (2..corners).map(|last| [0, last - 1, last]).for_each(take);
+    cut
 }
 
 /// The two coordinates to look at, in the order that turns the polygon counter-clockwise.

@@ -45,7 +45,7 @@ pub(crate) enum Rejection {
     Unreadable(String),
     /// More triangles than a binary STL can count.
     TooMany,
-    /// More triangles than this by objects that are placed again and again.
+    /// More triangles than this by objects that are placed again.
     Copies(u64),
 }
 
@@ -60,7 +60,7 @@ impl Rejection {
             },
             Self::Copies(most) => Error::Refused {
                 path: path.to_owned(),
-                reason: format!("its objects are placed so often that they are more than {} triangles", Count(most)),
+                reason: format!("the copies of its objects are more than {} triangles", Count(most)),
                 advice: "let it place fewer copies".into(),
             },
         }

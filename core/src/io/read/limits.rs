@@ -9,12 +9,12 @@ pub const PREFIX_BYTES: usize = HEADER_BYTES + 4;
 /// Most triangles a binary STL's count can hold, hence the most we read.
 pub const MAX_TRIANGLES: u64 = u32::MAX as u64;
 
-/// Triangles that objects may be placed as, at most, where some are placed several times: so many, and so many for each byte of the file. A mebibyte
-/// of copies of copies would else fill a disk.
+/// Triangles that copies of objects may have, at most: so many, and so many for each byte of the file. A mebibyte of copies of copies would else fill
+/// a disk.
 const COPIES: u64 = 16 << 20;
 const COPIES_A_BYTE: u64 = 16;
 
-/// Most triangles that a file of so many bytes makes by placing its `own` triangles, some of them several times.
-pub(super) fn most_placed(bytes: usize, own: u64) -> u64 {
-    (COPIES + COPIES_A_BYTE * bytes as u64).max(own).min(MAX_TRIANGLES)
+/// Most triangles that a file of so many bytes makes by placing objects again that it has placed already.
+pub(super) fn most_copies(bytes: usize) -> u64 {
+    COPIES + COPIES_A_BYTE * bytes as u64
 }

@@ -75,7 +75,7 @@ impl Content {
             sniff::Kind::Amf => {
                 let _ = input.advise(memmap2::Advice::Sequential);
                 let (content, zeros) = tail::split(input);
-                let parsed = parallel::in_pool(context.limits.threads, || amf::read(content, context))?;
+                let parsed = parallel::in_pool(context.limits.threads, || amf::read(content, input.len(), context))?;
                 Ok(Self::parsed(parsed, Format::Amf, tail::of_text(content, zeros).into_iter().collect()))
             }
             sniff::Kind::Obj(start) => {

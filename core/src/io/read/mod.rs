@@ -11,6 +11,7 @@ mod access;
 mod amf;
 mod archive;
 mod binary;
+mod built;
 mod elements;
 mod faces;
 mod facets;

@@ -4,9 +4,9 @@
 //!
 //! **Out:** n - 2 triangles for n corners, in the polygon's direction.
 //!
-//! **Promise:** of a polygon that does not cross itself and has no more than 2^17 corners, no triangle overlaps another or has the wrong direction;
-//! corners that repeat and edges that go back on themselves cost triangles without area. Of every other polygon the triangles are the same each time;
-//! where some of them are a fan that may lie outside, the caller is told. Work and memory are bounded for each polygon.
+//! **Promise:** of a polygon that does not cross itself, no triangle overlaps another or has the wrong direction; corners that repeat and edges that
+//! go back on themselves cost triangles without area. Of every other polygon the triangles are the same each time. Work and memory are bounded for
+//! each polygon: beyond the bounds the rest of it is a fan, which may lie outside, and the caller is told.
 //!
 //! The polygon is looked at along the axis that is nearest to its normal (M. E. Newell's, in I. E. Sutherland, R. F. Sproull, R. A. Schumacker,
 //! "A characterization of ten hidden-surface algorithms", 1974). Coordinates stay as they are, so that predicates decide exactly.

@@ -47,8 +47,15 @@ const MOST_FINDINGS: usize = 32;
 /// Bytes that a line of a report may have.
 const LONGEST: usize = 4096;
 
+/// Makes the caller's thread a pool of its own: to start a thread for each input takes longer than to read it.
+fn alone() {
+    static POOL: std::sync::Once = std::sync::Once::new();
+    POOL.call_once(|| std::mem::forget(rayon::ThreadPoolBuilder::new().num_threads(1).use_current_thread().build()));
+}
+
 /// Reads `bytes` by `reader`, twice, and checks what it makes of them.
 pub fn check(reader: Reader, bytes: &[u8]) {
+    alone();
     let read = |threads| {
         let limits = limits(threads);
         within_bounds(bytes.len(), || fuzzing::read(reader, bytes, Path::new(SPOOLS), &limits))
@@ -58,8 +65,7 @@ pub fn check(reader: Reader, bytes: &[u8]) {
         Ok(made) => plausible(made),
         Err(error) => refused(error),
     }
-    // More threads cost more than the reading: now and then.
-    let threads = if bytes.len() % 16 == 0 { 2 } else { 1 };
+    let threads = if bytes.len().is_multiple_of(64) { 2 } else { 1 };
     let is_same = match (&first, &read(threads)) {
         (Ok(first), Ok(again)) => first == again,
         (Err(first), Err(again)) => first.to_string() == again.to_string(),
@@ -70,6 +76,7 @@ pub fn check(reader: Reader, bytes: &[u8]) {
 
 /// Reads a package object by object, too, as repairs do.
 pub fn check_package(bytes: &[u8]) {
+    alone();
     check(Reader::Archive, bytes);
     if bytes.is_empty() {
         return;
@@ -158,7 +165,11 @@ pub fn measure(bytes: &[u8]) -> Measured {
     let begin = std::time::Instant::now();
     let (result, most) = memory::most_during(|| fuzzing::read(Reader::Sniffed, bytes, Path::new(SPOOLS), &limits(1)));
     let said = match result {
-        Ok(made) => format!("{} triangles, {:?}", made.records.len(), made.findings.iter().map(|finding| &finding.text).collect::<Vec<_>>()),
+        Ok(made) => format!(
+            "{} triangles, {:?}",
+            made.records.len(),
+            made.findings.iter().map(|finding| &finding.text).collect::<Vec<_>>()
+        ),
         Err(error) => error.to_string(),
     };
     Measured { seconds: begin.elapsed().as_secs_f64(), most, said }

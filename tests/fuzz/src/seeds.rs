@@ -1,9 +1,9 @@
 //! Small files to begin with, by target: the forms that the tests of the whole program write, and odd ones that few programs write.
 
+use crate::BETWEEN;
 use crate::forms::{self, Form};
 use crate::stl::{self, Triangle};
 use crate::zip;
-use crate::BETWEEN;
 
 /// The seeds of all targets.
 pub fn all() -> Vec<(&'static str, Vec<Vec<u8>>)> {
@@ -20,7 +20,15 @@ pub fn all() -> Vec<(&'static str, Vec<Vec<u8>>)> {
         ("obj", with(vec![write(Form::Obj)], &OBJ)),
         ("amf", with(vec![write(Form::Amf)], &AMF)),
         ("amf_packed", with(vec![write(Form::Amf)], &AMF)),
-        ("threemf", vec![write(Form::ThreeMf), write(Form::PackedAmf), project(&boxes), zip::write(&[("a/", b""), ("a/b.amf", b"<amf/>")], 0)]),
+        (
+            "threemf",
+            vec![
+                write(Form::ThreeMf),
+                write(Form::PackedAmf),
+                project(&boxes),
+                zip::write(&[("a/", b""), ("a/b.amf", b"<amf/>")], 0),
+            ],
+        ),
         ("threemf_model", models(&boxes)),
         ("threemf_parts", vec![parts(&boxes)]),
     ]
@@ -90,7 +98,9 @@ fn off_binary(triangles: &[Triangle]) -> Vec<u8> {
 /// Models of one object, and of objects in objects.
 fn models(triangles: &[Triangle]) -> Vec<Vec<u8>> {
     let indexed = forms::indexed(triangles);
-    let painted = forms::mesh_of_model(&indexed, |k| if k % 3 == 0 { " slic3rpe:mmu_segmentation=\"4C\" pid=\"1\" p1=\"0\"".into() } else { String::new() });
+    let painted = forms::mesh_of_model(&indexed, |k| {
+        if k % 3 == 0 { " slic3rpe:mmu_segmentation=\"4C\" pid=\"1\" p1=\"0\"".into() } else { String::new() }
+    });
     let simple = forms::model(&format!("<object id=\"1\" type=\"model\">{painted}</object>"), "<item objectid=\"1\"/>");
     let nested = forms::model(
         &format!(
@@ -119,8 +129,11 @@ fn parts(triangles: &[Triangle]) -> Vec<u8> {
     let objects = format!(
         "<object id=\"1\">{mesh}</object><object id=\"2\"><components><component p:path=\"/3D/Objects/a.model\" objectid=\"5\"/></components></object>"
     );
-    let model = forms::model(&objects, "<item objectid=\"1\"/><item objectid=\"2\"/>")
-        .replacen("<model ", "<model xmlns:p=\"http://schemas.microsoft.com/3dmanufacturing/production/2015/06\" requiredextensions=\"p\" ", 1);
+    let model = forms::model(&objects, "<item objectid=\"1\"/><item objectid=\"2\"/>").replacen(
+        "<model ",
+        "<model xmlns:p=\"http://schemas.microsoft.com/3dmanufacturing/production/2015/06\" requiredextensions=\"p\" ",
+        1,
+    );
     let relationships = "<Relationships xmlns=\"http://schemas.openxmlformats.org/package/2006/relationships\"><Relationship Target=\"/3D/Objects/a.model\" \
         Id=\"r\" Type=\"http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel\"/></Relationships>";
     let config = "<?xml version=\"1.0\" encoding=\"UTF-8\"?><config><object id=\"1\"><volume firstid=\"0\" lastid=\"5\"><metadata type=\"volume\" \

@@ -67,7 +67,7 @@ pub fn check(reader: Reader, bytes: &[u8]) {
     }
     let threads = if bytes.len().is_multiple_of(64) { 2 } else { 1 };
     let is_same = match (&first, &read(threads)) {
-        (Ok(first), Ok(again)) => first == again,
+        (Ok(first), Ok(again)) => first.records() == again.records() && first.findings() == again.findings(),
         (Err(first), Err(again)) => first.to_string() == again.to_string(),
         _ => false,
     };
@@ -132,8 +132,8 @@ fn within_bounds<R>(length: usize, read: impl FnOnce() -> R) -> R {
 }
 
 fn plausible(made: &Made) {
-    assert!(!made.records.is_empty(), "a mesh has a triangle");
-    let findings = &made.findings;
+    assert!(!made.records().is_empty(), "a mesh has a triangle");
+    let findings = made.findings();
     findings.iter().for_each(|Finding { text, .. }| one_line(text));
     assert!(findings.len() <= MOST_FINDINGS, "{} findings", findings.len());
     let mut texts: Vec<&str> = findings.iter().map(|finding| finding.text.as_str()).collect();
@@ -167,8 +167,8 @@ pub fn measure(bytes: &[u8]) -> Measured {
     let said = match result {
         Ok(made) => format!(
             "{} triangles, {:?}",
-            made.records.len(),
-            made.findings.iter().map(|finding| &finding.text).collect::<Vec<_>>()
+            made.records().len(),
+            made.findings().iter().map(|finding| &finding.text).collect::<Vec<_>>()
         ),
         Err(error) => error.to_string(),
     };

@@ -36,12 +36,21 @@ pub enum Reader {
 }
 
 /// All that a reader makes of bytes.
-#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Made {
+    input: Mmap,
+    content: Content,
+}
+
+impl Made {
     /// The triangles.
-    pub records: Vec<Record>,
+    pub fn records(&self) -> &[Record] {
+        self.content.records(&self.input)
+    }
+
     /// Oddities of the file.
-    pub findings: Vec<Finding>,
+    pub fn findings(&self) -> &[Finding] {
+        &self.content.findings
+    }
 }
 
 /// Reads `bytes`; spools go to `spool`.
@@ -61,7 +70,7 @@ pub fn read(reader: Reader, bytes: &[u8], spool: &Path, limits: &Limits) -> Resu
         Reader::Archive => sniff::Kind::Archive,
     };
     let content = Content::of(kind, &input, &Context { path, spool, limits, progress: &Quiet })?;
-    Ok(Made { records: content.records(&input).to_vec(), findings: content.findings })
+    Ok(Made { input, content })
 }
 
 /// Opens the package at `path`, and reads each object that is repaired; how many there are.

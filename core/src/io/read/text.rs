@@ -2,7 +2,7 @@
 
 use super::binary;
 use super::facets::{self, Tally};
-use super::finding::{Finding, Rejection};
+use super::finding::{Finding, Rejection, legible_bytes};
 use super::limits::HEADER_BYTES;
 use super::number::{COMMA, POINT};
 use super::spool::{Context, Parsed};
@@ -131,7 +131,7 @@ fn findings(tally: &Tally) -> Vec<Finding> {
     flaw(tally.odd_names > 0, &|| "the name of a solid is not UTF-8".into());
     if tally.solids > 1 {
         // Every common slicer joins them.
-        let names: Vec<_> = tally.names.iter().map(|name| String::from_utf8_lossy(name)).collect();
+        let names: Vec<_> = tally.names.iter().map(|name| legible_bytes(name)).collect();
         let more = if tally.solids > names.len() as u64 { ", …" } else { "" };
         let text = format!("{} solids ({}{more}), read as one mesh", Count(tally.solids), names.join(", "));
         found.push(Finding { harmless: true, ..Finding::flaw(text) });

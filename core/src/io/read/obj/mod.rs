@@ -17,7 +17,7 @@ mod tests;
 
 use super::binary;
 use super::faces::Tally;
-use super::finding::{Finding, Rejection};
+use super::finding::{Finding, Rejection, legible_bytes};
 use super::foreign;
 use super::number::{COMMA, POINT};
 use super::spool::{Context, POSITION_BYTES, Parsed};
@@ -238,11 +238,11 @@ fn findings(bytes: &[u8], found: &Survey, cut_off: bool) -> Vec<Finding> {
         format!("{} in free form, left out", Counted(found.curves, "curve or surface", "curves and surfaces"))
     });
     note(found.unknown > 0, true, &|| {
-        let first = String::from_utf8_lossy(found.first_unknown.as_deref().unwrap_or_default()).into_owned();
+        let first = legible_bytes(found.first_unknown.as_deref().unwrap_or_default());
         format!("{} unknown to OBJ, passed over; the first is \"{first}\"", Counted(found.unknown, "statement", "statements"))
     });
     note(found.objects > 1, true, &|| {
-        let names: Vec<_> = found.names.iter().map(|name| String::from_utf8_lossy(name)).collect();
+        let names: Vec<_> = found.names.iter().map(|name| legible_bytes(name)).collect();
         let more = if found.objects > names.len() as u64 { ", …" } else { "" };
         format!("{} objects ({}{more}), read as one mesh", Count(found.objects), names.join(", "))
     });

@@ -69,10 +69,10 @@ impl Tally {
             found.push(Finding { harmless: true, ..Finding::flaw(text) });
         }
         if self.fans > 0 {
-            let faces = Counted(self.fans, "polygon has", "polygons have");
+            let faces = Counted(self.fans, "polygon", "polygons");
             let first = Count(self.first_fan.unwrap_or_default());
-            let reasons = "no plane, too many corners, or cross themselves too much to be cut well";
-            found.push(Finding::flaw(format!("{faces} {reasons}: read as fans from one corner; the first is face {first}")));
+            let reasons = "of too many corners, or that cross themselves too much to be cut well";
+            found.push(Finding::flaw(format!("{faces} {reasons}, read as fans from one corner; the first is face {first}")));
         }
         found
     }

@@ -28,7 +28,7 @@ const MOST_CLIPPED: usize = 1 << 17;
 pub(super) enum Cut {
     /// As far as any can.
     Whole,
-    /// Some are a fan that may lie outside of it: it has no plane, crosses itself too much, or has too many corners.
+    /// Some are a fan that may lie outside of it: its halves cancel, it crosses itself too much, or has too many corners.
     Fan,
 }
 
@@ -47,7 +47,7 @@ pub(super) fn cut(polygon: &[Point], take: impl FnMut([usize; 3])) -> Cut {
         (Some(plane), _) if polygon.len() <= MOST_CLIPPED => {
             if ears::clip(polygon.iter().map(|corner| plane.flat(*corner)), take) { Cut::Whole } else { Cut::Fan }
         }
-        _ => fan(polygon.len(), take, if polygon.len() > 3 { Cut::Fan } else { Cut::Whole }),
+        _ => fan(polygon.len(), take, if polygon.len() > 3 && !is_line(polygon) { Cut::Fan } else { Cut::Whole }),
     }
 }
 
@@ -88,6 +88,14 @@ impl Plane {
         let Self([u, v]) = self;
         Coord { x: f64::from(corner[u]), y: f64::from(corner[v]) }
     }
+}
+
+/// All corners on a line, or in one place: no triangle has an area.
+fn is_line(polygon: &[Point]) -> bool {
+    let Some((a, b)) = polygon.first().and_then(|a| Some((a, polygon.iter().find(|b| *b != a)?))) else { return true };
+    let planes = [Plane([0, 1]), Plane([1, 2]), Plane([2, 0])];
+    let is_on = |corner: &Point| planes.iter().all(|plane| orient2d(plane.flat(*a), plane.flat(*b), plane.flat(*corner)) == 0.0);
+    polygon.iter().all(is_on)
 }
 
 /// The first diagonal that leaves no triangle of the wrong direction, with preference for two that have an area.

@@ -65,7 +65,7 @@ pub fn check(reader: Reader, bytes: &[u8]) {
         Ok(made) => plausible(made),
         Err(error) => refused(error),
     }
-    let threads = if bytes.len().is_multiple_of(64) { 2 } else { 1 };
+    let threads = if bytes.len().is_multiple_of(16) { 2 } else { 1 };
     let is_same = match (&first, &read(threads)) {
         (Ok(first), Ok(again)) => first.records() == again.records() && first.findings() == again.findings(),
         (Err(first), Err(again)) => first.to_string() == again.to_string(),

@@ -9,8 +9,9 @@ use memmap2::Mmap;
 
 use super::finding::Finding;
 use super::mesh_file::Content;
+use super::package_file::PackageFile;
+use super::sniff;
 use super::spool::Context;
-use super::{PackageFile, sniff};
 use crate::contract::error::Result;
 use crate::contract::progress::Quiet;
 use crate::contract::settings::Limits;

@@ -3,7 +3,7 @@
 use super::binary;
 use super::facets::{self, Tally};
 use super::finding::{Finding, Rejection, legible_bytes};
-use super::limits::HEADER_BYTES;
+use super::limits::{HEADER_BYTES, window};
 use super::number::{COMMA, POINT};
 use super::spool::{Context, Parsed};
 use crate::contract::error::Result;
@@ -11,7 +11,7 @@ use crate::io::record::Record;
 use crate::util::words::{Count, Counted};
 
 /// Text parsed at a time by one thread.
-pub(super) const WINDOW: usize = 1 << 20;
+pub(super) const WINDOW: usize = window(1 << 20);
 /// A window grows up to this to reach the next facet; beyond that the text is no mesh.
 const LONGEST: usize = 8 * WINDOW;
 

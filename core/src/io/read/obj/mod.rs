@@ -19,6 +19,7 @@ use super::binary;
 use super::faces::Tally;
 use super::finding::{Finding, Rejection, legible_bytes};
 use super::foreign;
+use super::limits::window;
 use super::number::{COMMA, POINT};
 use super::spool::{Context, POSITION_BYTES, Parsed};
 use super::vertices::Vertices;
@@ -30,7 +31,7 @@ use surfaces::Surfaces;
 use survey::{Statement, Survey};
 
 /// Text parsed at a time by one thread.
-const WINDOW: usize = 1 << 20;
+const WINDOW: usize = window(1 << 20);
 /// A window grows up to this to reach the end of a line; beyond that the text is no mesh.
 const LONGEST: usize = 16 * WINDOW;
 /// So much of a text is looked at to tell its kind, behind the comments that it begins with.

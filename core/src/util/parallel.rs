@@ -22,6 +22,9 @@ fn useful(threads: usize) -> usize {
 /// Runs `work` on a rayon pool of so many threads.
 pub(crate) fn in_pool<R: Send>(threads: usize, work: impl FnOnce() -> R + Send) -> R {
     let threads = useful(threads);
+    if rayon::current_thread_index().is_some() && rayon::current_num_threads() == threads {
+        return work();
+    }
     if let Ok(pool) = ThreadPoolBuilder::new().num_threads(threads).build() {
         return pool.install(work);
     }

@@ -1,11 +1,12 @@
 //! Meshes as copying, transfer and editors damage them, through the daemon: each ends in its place, and no worker dies of any.
 
 use suture_bench::generate::{Case, write};
+use suture_tests::forms::{self, Form};
 use suture_tests::served::jobs;
 use suture_tests::{Place, stl};
 
-/// Files there are.
-const FILES: u64 = 40;
+/// Files there are: twice each format other than STL, and as many STL.
+const FILES: usize = 4 * Form::ALL.len();
 
 /// A small generator of numbers (xorshift).
 struct Dice(u64);
@@ -19,13 +20,17 @@ impl Dice {
     }
 }
 
-/// A mesh, binary or as text, after some flips, cuts, losses, doublings and insertions.
-fn mutated(seed: u64, dice: &mut Dice) -> Vec<u8> {
+/// A name, and a mesh after some flips, cuts, losses, doublings and insertions: in a format of its own, or an STL, binary or as text.
+fn mutated(number: usize, dice: &mut Dice) -> (String, Vec<u8>) {
     let mut bytes = Vec::new();
     let case = [Case::Clean, Case::Holes, Case::Mixed, Case::Soup][dice.below(4)];
-    write(case, 512, seed, &mut bytes).unwrap();
-    if dice.below(3) == 0 {
-        bytes = stl::text("part", &stl::records(&bytes).iter().map(stl::corners).collect::<Vec<_>>()).into_bytes();
+    write(case, 512, number as u64, &mut bytes).unwrap();
+    let triangles: Vec<_> = stl::records(&bytes).iter().map(stl::corners).collect();
+    let form = Form::ALL.get(number / 2).copied();
+    match form {
+        Some(form) => bytes = forms::write(form, &triangles),
+        None if dice.below(3) == 0 => bytes = stl::text("part", &triangles).into_bytes(),
+        None => {}
     }
     for _ in 0..=dice.below(4) {
         // Half of them near the beginning, where the counts stand.
@@ -43,7 +48,7 @@ fn mutated(seed: u64, dice: &mut Dice) -> Vec<u8> {
             _ => bytes.splice(at..at, vec![dice.below(256) as u8; end - at]).for_each(drop),
         }
     }
-    bytes
+    (format!("{number}.{}", form.map_or("stl", Form::ending)), bytes)
 }
 
 /// `SUTURE_SEED` says which files.
@@ -55,7 +60,7 @@ fn f13_mutated_meshes_end_in_their_places_and_no_worker_dies() {
     let place = Place::new();
     let settings = "settle = \"30ms\"\nmemory = \"512MiB\"\ntime_limit = { base = \"60s\", per_gib = \"1s\" }";
     place.put("suture.toml", format!("{settings}\n[[folders]]\npath = \"hot\"\n").as_bytes());
-    let dropped: Vec<(String, Vec<u8>)> = (0..FILES).map(|k| (format!("{k}.stl"), mutated(k, &mut dice))).collect();
+    let dropped: Vec<(String, Vec<u8>)> = (0..FILES).map(|number| mutated(number, &mut dice)).collect();
     for (name, bytes) in &dropped {
         place.put(&format!("hot/in/{name}"), bytes);
     }

@@ -1,13 +1,13 @@
 //! Faces by their vertices become records.
 
 use super::finding::{Finding, Rejection};
-use super::polygon;
+use super::polygon::{self, Cut};
 use super::vertices::Vertices;
 use crate::io::record::{self, Point, Record};
 use crate::util::words::{Count, Counted};
 
 /// Most corners of one face. Cutting a polygon takes memory and time by its corners, and no program writes such a face of a mesh.
-pub(super) const MOST_CORNERS: usize = 1 << 20;
+pub(super) const MOST_CORNERS: usize = 1 << 19;
 
 /// Counts of faces, by what became of them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -18,6 +18,10 @@ pub(super) struct Tally {
     pub(super) short: u64,
     /// Of more than three corners, which were cut into triangles.
     pub(super) polygons: u64,
+    /// Of these, polygons whose triangles may lie outside of them ([`Cut::Fan`]).
+    pub(super) fans: u64,
+    /// The number of the first of them among all faces, from 1.
+    pub(super) first_fan: Option<u64>,
     /// With an index that no vertex has, or of more corners than a face can have; left out.
     pub(super) astray: u64,
     /// The number of the first of them among all faces, from 1.
@@ -28,9 +32,11 @@ impl Tally {
     /// Joins the counts of the faces behind these.
     pub(super) fn append(&mut self, behind: Self) {
         self.first_astray = self.first_astray.or(behind.first_astray.map(|first| self.faces + first));
+        self.first_fan = self.first_fan.or(behind.first_fan.map(|first| self.faces + first));
         self.faces += behind.faces;
         self.short += behind.short;
         self.polygons += behind.polygons;
+        self.fans += behind.fans;
         self.astray += behind.astray;
     }
 
@@ -61,6 +67,12 @@ impl Tally {
         if self.polygons > 0 {
             let text = format!("{} of more than three corners, cut into triangles", Counted(self.polygons, "face", "faces"));
             found.push(Finding { harmless: true, ..Finding::flaw(text) });
+        }
+        if self.fans > 0 {
+            let faces = Counted(self.fans, "polygon", "polygons");
+            let first = Count(self.first_fan.unwrap_or_default());
+            let reasons = "of too many corners, or that cross themselves too much to be cut well";
+            found.push(Finding::flaw(format!("{faces} {reasons}, read as fans from one corner; the first is face {first}")));
         }
         found
     }
@@ -116,7 +128,11 @@ impl<'v> Faces<'v> {
             ref corners => {
                 self.tally.polygons += 1;
                 let (records, at) = (&mut self.records, |place: usize| corners.get(place).copied().unwrap_or_default());
-                polygon::cut(corners, |triangle| records.push(record::encode(triangle.map(at), 0)));
+                records.reserve(corners.len());
+                if polygon::cut(corners, |triangle| records.push(record::encode(triangle.map(at), 0))) == Cut::Fan {
+                    self.tally.fans += 1;
+                    self.tally.first_fan = self.tally.first_fan.or(Some(self.tally.faces));
+                }
             }
         }
     }
@@ -153,11 +169,29 @@ mod tests {
         let corners: Vec<_> = faces.records.iter().map(record::corners).collect();
         assert_eq!(corners.len(), 3);
         assert_eq!(corners[0], [points[0], points[1], points[2]]);
-        let expected = Tally { faces: 5, short: 1, polygons: 1, astray: 2, first_astray: Some(4) };
+        let expected = Tally { faces: 5, short: 1, polygons: 1, astray: 2, first_astray: Some(4), ..Tally::default() };
         assert_eq!(faces.tally, expected);
+        assert!(!expected.findings().iter().any(|finding| finding.text.contains("fan")));
         let mut all = expected;
         all.append(expected);
-        assert_eq!(all, Tally { faces: 10, short: 2, polygons: 2, astray: 4, first_astray: Some(4) });
+        assert_eq!(all, Tally { faces: 10, short: 2, polygons: 2, astray: 4, first_astray: Some(4), ..Tally::default() });
         assert!(all.judge().is_ok() && Tally { faces: 3, astray: 2, ..Tally::default() }.judge().is_err());
+    }
+
+    #[test]
+    fn a_polygon_that_becomes_a_fan_makes_a_finding() {
+        // A bow tie of five corners, whose halves cancel: it has no plane.
+        let points = [[0.0; 3], [2.0, 2.0, 0.0], [2.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 2.0, 0.0]];
+        let packed = points.map(packed);
+        let mut faces = Faces::of(Vertices::spooled(&packed));
+        faces.triangle([0, 1, 2]);
+        faces.polygon([0, 1, 2, 3, 4].into_iter());
+        let mut tally = faces.tally;
+        assert_eq!((tally.fans, tally.first_fan, faces.records.len()), (1, Some(2), 4));
+        tally.append(faces.tally);
+        assert_eq!((tally.fans, tally.first_fan), (2, Some(2)));
+        let found = tally.findings();
+        let fan = found.iter().find(|finding| finding.text.contains("fan")).unwrap();
+        assert!(fan.text.contains("2 polygons") && fan.text.ends_with("the first is face 2") && !fan.harmless, "{fan:?}");
     }
 }

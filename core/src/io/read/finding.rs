@@ -38,6 +38,35 @@ impl Finding {
     }
 }
 
+/// Characters of a file's own words that are shown, at most.
+const SHOWN: usize = 80;
+
+/// A file's own words for people: control characters escaped, and cut to 80 characters.
+pub(super) fn legible(words: &str) -> String {
+    let mut text = String::new();
+    for (count, character) in words.chars().enumerate() {
+        if count == SHOWN {
+            text.push('…');
+            break;
+        }
+        // Besides control characters those that turn the direction of text, or are not seen at all.
+        match character {
+            '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2060}'..='\u{2069}' | '\u{feff}' => {
+                text.extend(character.escape_unicode());
+            }
+            _ if character.is_control() => text.extend(character.escape_default()),
+            _ => text.push(character),
+        }
+    }
+    text
+}
+
+/// The same of bytes, which may be no UTF-8.
+pub(super) fn legible_bytes(words: &[u8]) -> String {
+    let start = words.get(..4 * SHOWN + 4).unwrap_or(words);
+    legible(&String::from_utf8_lossy(start))
+}
+
 /// Why a file was not read, before it is joined with the file's name.
 #[derive(Debug, PartialEq, Eq)]
 pub(crate) enum Rejection {
@@ -45,6 +74,8 @@ pub(crate) enum Rejection {
     Unreadable(String),
     /// More triangles than a binary STL can count.
     TooMany,
+    /// More triangles than this by objects that are placed again.
+    Copies(u64),
 }
 
 impl Rejection {
@@ -55,6 +86,11 @@ impl Rejection {
                 path: path.to_owned(),
                 reason: format!("more than {} triangles", Count(MAX_TRIANGLES)),
                 advice: "split it, for no binary STL can count them".into(),
+            },
+            Self::Copies(most) => Error::Refused {
+                path: path.to_owned(),
+                reason: format!("the copies of its objects are more than {} triangles", Count(most)),
+                advice: "let it place fewer copies".into(),
             },
         }
     }

@@ -47,10 +47,10 @@ pub struct MeshFile {
 }
 
 /// What the bytes of a file hold.
-struct Content {
+pub(super) struct Content {
     source: Source,
     format: Format,
-    findings: Vec<Finding>,
+    pub(super) findings: Vec<Finding>,
     header: [u8; HEADER_BYTES],
     unit: Option<&'static str>,
     positions: Option<Positions>,
@@ -58,7 +58,11 @@ struct Content {
 }
 
 impl Content {
-    fn of(kind: sniff::Kind, input: &Mmap, context: &Context<'_>) -> Result<Self> {
+    /// Reads `input` as a file of this kind.
+    ///
+    /// # Errors
+    /// Those of [`MeshFile::open`], but for those of opening.
+    pub(super) fn of(kind: sniff::Kind, input: &Mmap, context: &Context<'_>) -> Result<Self> {
         match kind {
             sniff::Kind::Binary(sniff::Layout { triangles, mut findings }) => {
                 findings.extend(tail::of_records(binary::records(input, triangles)));
@@ -84,7 +88,7 @@ impl Content {
             sniff::Kind::Amf => {
                 let _ = input.advise(memmap2::Advice::Sequential);
                 let (content, zeros) = tail::split(input);
-                let parsed = parallel::in_pool(context.limits.threads, || amf::read(content, context))?;
+                let parsed = parallel::in_pool(context.limits.threads, || amf::read(content, input.len(), context))?;
                 Ok(Self::parsed(parsed, Format::Amf, tail::of_text(content, zeros).into_iter().collect()))
             }
             sniff::Kind::Obj(start) => {
@@ -105,6 +109,16 @@ impl Content {
                 let parsed = parallel::in_pool(context.limits.threads, || ply::read(input, context))?;
                 Ok(Self::parsed(parsed, Format::Ply, Vec::new()))
             }
+        }
+    }
+
+    /// The triangles, where `input` is the file.
+    #[cfg(fuzzing)]
+    pub(super) fn records<'s>(&'s self, input: &'s Mmap) -> &'s [Record] {
+        match &self.source {
+            Source::InPlace(triangles) => binary::records(input, *triangles),
+            Source::Spooled(spool) => spool.all(),
+            Source::Welded(..) => &[],
         }
     }
 

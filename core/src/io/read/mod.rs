@@ -11,11 +11,14 @@ mod access;
 mod amf;
 mod archive;
 mod binary;
+mod built;
 pub(super) mod elements;
 mod faces;
 mod facets;
 mod finding;
 mod foreign;
+#[cfg(fuzzing)]
+pub mod fuzzing;
 mod limits;
 mod mesh_file;
 mod number;

@@ -6,24 +6,19 @@ use std::path::{Path, PathBuf};
 use memmap2::Mmap;
 
 use super::archive::Archive;
-use super::binary;
 use super::finding::{Finding, Rejection};
 use super::opened::Opened;
-use super::rounding::Rounding;
-use super::spool::{Context, Parsed, Spool};
+use super::spool::Context;
 use super::threemf::slicer::{self, Volume};
-use super::threemf::{Content, MeshRecords, Model, Object, Place, Purpose, Transform};
+use super::threemf::{Content, MeshRecords, Model, Object, Place, Purpose};
 use crate::contract::error::Result;
 use crate::contract::progress::Progress;
 use crate::contract::settings::Limits;
-use crate::io::record::{self, Record};
 use crate::util::parallel;
 use crate::util::words::Counted;
 
 /// The part that every package has.
 pub(super) const CONTENT_TYPES: &str = "[Content_Types].xml";
-/// Records that are placed at once.
-const PLACED: usize = 16 << 10;
 
 /// An open package.
 pub(crate) struct PackageFile {
@@ -191,7 +186,8 @@ fn places(model: &Model) -> impl Iterator<Item = (Place, &Object)> {
         .flat_map(|(part, of)| of.objects.iter().enumerate().map(move |(object, own)| (Place { part, object }, own)))
 }
 
-fn is_repaired(object: &Object) -> bool {
+/// A mesh of triangles that is printed.
+pub(super) fn is_repaired(object: &Object) -> bool {
     let is_printed = matches!(object.purpose, Purpose::Model | Purpose::SolidSupport);
     is_printed && matches!(&object.content, Content::Mesh(mesh) if !mesh.lattice && !mesh.triangles.inner.is_empty())
 }
@@ -224,70 +220,4 @@ fn left_alone(model: &Model) -> Vec<Finding> {
     .into_iter()
     .flatten()
     .collect()
-}
-
-/// All that is built, as one mesh: each object where build items and components place it.
-pub(super) fn built(model: &Model, context: &Context<'_>) -> Result<Parsed> {
-    let (spool, findings) = (context.records()?, model.findings.clone());
-    let mut placing = Placing { model, context, spool, findings, rounding: Rounding::default(), last: None };
-    let mut failed = Ok(());
-    for item in model.items() {
-        model.instances(item, |place, transform| {
-            let Some(object) = model.object(place) else { return };
-            if failed.is_err() || !is_repaired(object) {
-                return;
-            }
-            failed = placing.add(place, transform);
-        });
-    }
-    failed?;
-    let Placing { spool, findings, rounding, .. } = placing;
-    if spool.count() == 0 {
-        return Err(binary::no_triangles().at(context.path));
-    }
-    Ok(Parsed {
-        records: spool.map()?,
-        findings,
-        header: binary::header_of(b""),
-        rounding: rounding.if_any(),
-        unit: Some(model.unit().name()),
-        positions: None,
-        coloured: false,
-    })
-}
-
-/// Objects on their way to where they are built.
-struct Placing<'a> {
-    model: &'a Model,
-    context: &'a Context<'a>,
-    spool: Spool<'a, 50>,
-    findings: Vec<Finding>,
-    rounding: Rounding,
-    /// The object that was placed last: often it is placed again.
-    last: Option<(Place, MeshRecords)>,
-}
-
-impl Placing<'_> {
-    fn add(&mut self, place: Place, transform: &Transform) -> Result<()> {
-        if self.last.as_ref().is_none_or(|(there, _)| *there != place) {
-            let read = self.model.records(place, self.context)?;
-            self.findings.extend(read.parsed.findings.iter().cloned());
-            self.last = Some((place, read));
-        }
-        let records = self.last.as_ref().map_or(&[][..], |(_, read)| read.parsed.records.all());
-        for chunk in records.chunks(PLACED) {
-            let placed: Vec<Record> = chunk.iter().map(|record| placed(record, transform, &mut self.rounding)).collect();
-            self.spool.append(&placed)?;
-        }
-        self.context.at(self.spool.count(), self.spool.count())
-    }
-}
-
-fn placed(record: &Record, transform: &Transform, rounding: &mut Rounding) -> Record {
-    if transform.is_identity() {
-        return *record;
-    }
-    let [a, b, c] = record::corners(record).map(|corner| transform.apply(corner.map(f64::from)).map(|x| rounding.of_double(x)));
-    // A mirror image is turned inside out.
-    record::encode(if transform.mirrors() { [a, c, b] } else { [a, b, c] }, record::attribute(record))
 }

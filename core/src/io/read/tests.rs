@@ -1,6 +1,9 @@
 //! Whole files through [`MeshFile::open`], each built here from a few triangles.
 
 mod damage;
+mod hostile;
+mod known;
+mod spelling;
 mod text;
 
 use crate::contract::error::{Error, Result};

@@ -2,8 +2,8 @@
 
 use super::binary;
 use super::facets::{self, Tally};
-use super::finding::{Finding, Rejection};
-use super::limits::HEADER_BYTES;
+use super::finding::{Finding, Rejection, legible_bytes};
+use super::limits::{HEADER_BYTES, window};
 use super::number::{COMMA, POINT};
 use super::spool::{Context, Parsed};
 use crate::contract::error::Result;
@@ -11,7 +11,7 @@ use crate::io::record::Record;
 use crate::util::words::{Count, Counted};
 
 /// Text parsed at a time by one thread.
-pub(super) const WINDOW: usize = 1 << 20;
+pub(super) const WINDOW: usize = window(1 << 20);
 /// A window grows up to this to reach the next facet; beyond that the text is no mesh.
 const LONGEST: usize = 8 * WINDOW;
 
@@ -132,7 +132,7 @@ fn findings(tally: &Tally) -> Vec<Finding> {
     flaw(tally.odd_names > 0, &|| "the name of a solid is not UTF-8".into());
     if tally.solids > 1 {
         // Every common slicer joins them.
-        let names: Vec<_> = tally.names.iter().map(|name| String::from_utf8_lossy(name)).collect();
+        let names: Vec<_> = tally.names.iter().map(|name| legible_bytes(name)).collect();
         let more = if tally.solids > names.len() as u64 { ", …" } else { "" };
         let text = format!("{} solids ({}{more}), read as one mesh", Count(tally.solids), names.join(", "));
         found.push(Finding { harmless: true, ..Finding::flaw(text) });

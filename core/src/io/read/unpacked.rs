@@ -4,7 +4,7 @@ use super::archive::{Archive, shown};
 use super::finding::Rejection;
 use super::spool::{Context, Parsed};
 use super::threemf::Model;
-use super::{amf, package_file};
+use super::{amf, built, package_file};
 use crate::contract::error::Result;
 use crate::contract::report::Format;
 
@@ -16,14 +16,14 @@ pub(super) fn read(bytes: &[u8], context: &Context<'_>) -> Result<(Parsed, Forma
     let archive = Archive::open(bytes).map_err(|rejection| rejection.at(context.path))?;
     if archive.find(package_file::CONTENT_TYPES).is_some() {
         let model = Model::open(bytes, context)?;
-        return Ok((package_file::built(&model, context)?, Format::ThreeMf));
+        return Ok((built::mesh(&model, package_file::is_repaired, bytes.len(), context)?, Format::ThreeMf));
     }
     let is_amf = |name: &str| name.to_ascii_lowercase().ends_with(".amf");
     let files: Vec<_> = archive.entries.iter().filter(|entry| !entry.is_folder()).collect();
     match files.as_slice() {
         [entry] if is_amf(&entry.name) => {
             let text = archive.spooled(entry, context)?;
-            Ok((amf::read(text.all().as_flattened(), context)?, Format::Amf))
+            Ok((amf::read(text.all().as_flattened(), bytes.len(), context)?, Format::Amf))
         }
         [] => Err(Rejection::Unreadable("an archive without a file in it".into()).at(context.path)),
         [first, ..] => {

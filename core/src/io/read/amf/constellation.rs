@@ -3,9 +3,11 @@
 use std::collections::HashMap;
 
 use super::super::finding::Rejection;
-use super::document::{Document, Id, Item, MOST};
+use super::document::{Document, Id, Item};
 use super::placement::Placement;
 
+/// Most instances of all, those in instances counted as often as they are placed.
+const MOST: usize = 1_000_000;
 /// Most constellations within each other.
 const DEEPEST: usize = 32;
 

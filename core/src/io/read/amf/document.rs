@@ -9,9 +9,10 @@ use super::placement::Placement;
 use super::stretch::{End, Kind, is_colour};
 use super::xml::{Tag, Token, Tokens, Trouble};
 use crate::contract::error::{Error, Result};
+use crate::util::words::Count;
 
-/// Most objects, constellations, instances and meshes, each.
-pub(super) const MOST: usize = 1_000_000;
+/// Most objects, constellations, instances and meshes, together: a small archive unpacks to very many of them, and each takes some 170 bytes (measured).
+const MOST: usize = 1 << 18;
 /// Bytes of a name that are kept.
 const LONGEST_NAME: usize = 80;
 /// Bytes of an id, a unit or a type at most; what is longer counts as absent.
@@ -190,6 +191,16 @@ impl Document {
         }
     }
 
+    /// Counts one more object, constellation, instance or mesh.
+    fn count(&self) -> std::result::Result<(), Stop> {
+        let all = self.objects.len() + self.constellations.len() + self.instances.len() + self.meshes.len();
+        if all < MOST {
+            return Ok(());
+        }
+        let reason = format!("more than {} objects, constellations, instances and meshes", Count(MOST));
+        Err(Stop::Refused(Rejection::Unreadable(reason)))
+    }
+
     /// Reads the children of an element that holds vertices or triangles.
     fn children<'t>(
         &mut self,
@@ -221,7 +232,8 @@ impl Document {
             self.meshes.pop();
         }
         let mesh = Mesh { positions: position..position, indices: index..index, ..Mesh::default() };
-        push(&mut self.meshes, mesh, "1 000 000 meshes")?;
+        self.count()?;
+        self.meshes.push(mesh);
         if let Some(object) = self.objects.last_mut() {
             object.meshes.end = self.meshes.len();
         }
@@ -241,13 +253,15 @@ impl Document {
                 }
                 self.items.push(Item::Object(self.objects.len()));
                 let meshes = self.meshes.len()..self.meshes.len();
-                push(&mut self.objects, Object { id: id.map(hashed), meshes }, "1 000 000 objects")?;
+                self.count()?;
+                self.objects.push(Object { id: id.map(hashed), meshes });
             }
             [_, b"constellation"] => {
                 self.items.push(Item::Constellation(self.constellations.len()));
                 let instances = self.instances.len()..self.instances.len();
                 let constellation = Constellation { id: word(&tag, b"id").map(hashed), instances };
-                push(&mut self.constellations, constellation, "1 000 000 constellations")?;
+                self.count()?;
+                self.constellations.push(constellation);
             }
             [_, b"constellation", b"instance"] => self.instance_of(tag, tokens)?,
             [_, b"metadata"] => self.metadata(tag, tokens)?,
@@ -307,7 +321,8 @@ impl Document {
             }
         }
         self.scaled += u64::from(instance.scale != [1.0; 3]);
-        push(&mut self.instances, instance, "1 000 000 instances")?;
+        self.count()?;
+        self.instances.push(instance);
         if let Some(constellation) = self.constellations.last_mut() {
             constellation.instances.end = self.instances.len();
         }
@@ -337,13 +352,4 @@ fn word(tag: &Tag<'_>, name: &[u8]) -> Option<Vec<u8>> {
 fn hashed(id: Vec<u8>) -> Id {
     let hash = blake3::hash(&id);
     hash.as_bytes().first_chunk().copied().map(u128::from_le_bytes).unwrap_or_default()
-}
-
-/// Appends an item to a list of at most [`MOST`].
-fn push<T>(list: &mut Vec<T>, item: T, most: &'static str) -> std::result::Result<(), Stop> {
-    if list.len() >= MOST {
-        return Err(Stop::Refused(Rejection::Unreadable(format!("more than {most}"))));
-    }
-    list.push(item);
-    Ok(())
 }

@@ -7,15 +7,16 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use memchr::memmem;
 
+use super::super::limits::window;
 use super::super::rounding::Rounding;
 use super::super::spool::{Context, Spool};
 use super::stretch::{self, End, Indices, Kind, Notes, Position, Stretch};
 use crate::contract::error::Result;
 
 /// Text read at a time by one thread.
-pub(super) const WINDOW: usize = 1 << 20;
+pub(super) const WINDOW: usize = window(1 << 20);
 /// Text read before other threads are called: small objects are read by one.
-const FIRST: usize = 1 << 16;
+const FIRST: usize = window(1 << 16);
 /// Farther than this behind its window no child is read there, nor the next one looked for: [`FIRST`] reads on.
 const SLACK: usize = 1 << 20;
 

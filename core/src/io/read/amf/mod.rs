@@ -29,6 +29,7 @@ mod xml;
 
 use super::binary;
 use super::finding::{Finding, Loss, Rejection};
+use super::limits::most_copies;
 use super::number::COMMA;
 use super::spool::{Context, Parsed};
 use crate::contract::error::Result;
@@ -61,11 +62,11 @@ pub(super) fn is_amf(bytes: &[u8]) -> bool {
     }
 }
 
-/// Reads the text of an AMF.
+/// Reads the text of an AMF, which stands in a file of so many bytes.
 ///
 /// # Errors
 /// [`crate::contract::error::Error::Unreadable`] for what is no XML, holds no triangle, or places objects without end; those of the context.
-pub(super) fn read(text: &[u8], context: &Context<'_>) -> Result<Parsed> {
+pub(super) fn read(text: &[u8], bytes: usize, context: &Context<'_>) -> Result<Parsed> {
     let reject = |rejection: Rejection| rejection.at(context.path);
     let encoding = encoding(text).map_err(reject)?;
     context.make_room(text.len() as u64, "the triangles of the text")?;
@@ -76,7 +77,7 @@ pub(super) fn read(text: &[u8], context: &Context<'_>) -> Result<Parsed> {
     let (positions, indices) = (positions.map()?, indices.map()?);
     let names = Names::of(&document);
     let steps = (text.len() as u64, intake::expected_steps(text));
-    let placed = placed::place((&document, &names), (&positions, &indices), steps, context)?;
+    let placed = placed::place((&document, &names), (&positions, &indices), (steps, most_copies(bytes)), context)?;
     placed.tally.judge().map_err(reject)?;
     if placed.records.all().is_empty() {
         let cut_off = || Rejection::Unreadable("cut off before its first triangle".into());

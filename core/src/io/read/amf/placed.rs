@@ -44,21 +44,27 @@ fn part<'a, T>(items: &'a [T], range: &std::ops::Range<u64>) -> &'a [T] {
     items.get(range.start as usize..range.end as usize).unwrap_or_default()
 }
 
-/// Places all objects. `text`: bytes of it; placing is told as what follows them, up to `steps`.
+/// Places all objects. `text`: bytes of it; placing is told as what follows them, up to `steps`. Copies of objects may have `most` triangles.
 ///
 /// # Errors
 /// Refusals by constellations, [`Error::Refused`] for too many triangles, [`Error::NoSpace`], [`Error::Io`].
 pub(super) fn place(
     (document, names): (&Document, &Names),
     (positions, indices): (&Items<24>, &Items<12>),
-    (text, steps): (u64, u64),
+    ((text, steps), most): ((u64, u64), u64),
     context: &Context<'_>,
 ) -> Result<Placed> {
     let reject = |rejection: Rejection| rejection.at(context.path);
-    let mut total = 0u64;
+    let (mut total, own) = (0u64, indices.all().len() as u64);
     let count = |object: usize, _: &Placement| {
         total += document.meshes(object).iter().map(|mesh| mesh.indices.end - mesh.indices.start).sum::<u64>();
-        if total > MAX_TRIANGLES { Err(Rejection::TooMany) } else { Ok(()) }
+        if total > MAX_TRIANGLES {
+            Err(Rejection::TooMany)
+        } else if total.saturating_sub(own) > most {
+            Err(Rejection::Copies(most))
+        } else {
+            Ok(())
+        }
     };
     constellation::each(document, names, count).map_err(reject)?;
     context.make_room(total * size_of::<Record>() as u64, "the triangles of the objects")?;

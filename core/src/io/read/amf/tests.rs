@@ -276,7 +276,7 @@ fn files_of_slic3r_turn_by_radians_and_scale() {
 }
 
 #[test]
-fn constellations_without_end_are_refused() {
+fn f14_constellations_without_end_are_refused() {
     let refused = |content: &str, said: &str| {
         let reason = reason(amf(&(object("o", &FLAT, &[[0, 1, 2]]) + content)).as_bytes());
         assert!(reason.contains(said), "{reason}");
@@ -414,7 +414,7 @@ proptest! {
     }
 
     #[test]
-    fn any_bytes_never_panic(bytes in prop::collection::vec(any::<u8>(), 0..300), parts in prop::collection::vec(0usize..12, 0..30)) {
+    fn f13_any_bytes_in_an_amf_are_survived(bytes in prop::collection::vec(any::<u8>(), 0..300), parts in prop::collection::vec(0usize..12, 0..30)) {
         let words = ["<amf>", "<object>", "<mesh>", "<vertices>", "<vertex>", "</vertices>", "<volume>", "<!--", "<constellation id='a'>",
             "<instance objectid='a'>", "&#x", "]]>"];
         let text: String = parts.iter().map(|part| words[*part]).collect();
@@ -423,7 +423,7 @@ proptest! {
     }
 
     #[test]
-    fn a_changed_file_never_panics_and_threads_decide_nothing(
+    fn f13_a_changed_amf_is_survived_and_threads_decide_nothing(
         changes in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>(), 0u8..4), 1..6),
     ) {
         let nested = constellation("a", &[instance("0", &[("rz", 30.0)]), instance("0", &[("deltax", 0.1)])]);

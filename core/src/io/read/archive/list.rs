@@ -8,6 +8,10 @@ use crate::util::words::Count;
 
 /// Plain bytes of all entries together, at most.
 const MOST_PLAIN: u64 = 64 << 30;
+/// Plain bytes of a small archive. A larger one unpacks to no more than this many times its size. Models shrink to a tenth; deflate can shrink zeros to
+/// a thousandth (RFC 1951: 258 bytes in two bits), and what was shrunk is to be read in a few seconds.
+pub(super) const HARMLESS: u64 = 64 << 20;
+pub(super) const MOST_TIMES: u64 = 200;
 /// The digital signature behind the headers of a central directory (APPNOTE 4.3.13).
 const SIGNATURE: &[u8] = b"PK\x05\x05";
 
@@ -41,6 +45,11 @@ impl<'a> Archive<'a> {
             plain = plain.saturating_add(listed.plain);
             if plain > MOST_PLAIN {
                 let reason = format!("the archive unpacks to more than {} GiB", Count(MOST_PLAIN >> 30));
+                return Err(Rejection::Unreadable(reason));
+            }
+            let times = plain / (bytes.len() as u64).max(1);
+            if plain > HARMLESS && times > MOST_TIMES {
+                let reason = format!("the archive claims to unpack to {} times its size, as no model does", Count(times));
                 return Err(Rejection::Unreadable(reason));
             }
             // An entry ends before the directory does begin.

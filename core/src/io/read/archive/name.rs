@@ -2,32 +2,14 @@
 
 use std::collections::HashMap;
 
-use super::super::finding::Rejection;
+use super::super::finding::{Rejection, legible};
 
 /// Bytes of a name, at most.
 const LONGEST: usize = 1024;
-/// Characters of a name that a reason shows.
-const SHOWN: usize = 80;
 
 /// A name for people: control characters escaped, cut to 80 characters, in quotes.
 pub(crate) fn shown(name: &str) -> String {
-    let mut text = String::from("\"");
-    for (count, character) in name.chars().enumerate() {
-        if count == SHOWN {
-            text.push('…');
-            break;
-        }
-        // Besides control characters those that turn the direction of text, or are not seen at all.
-        match character {
-            '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2060}'..='\u{2069}' | '\u{feff}' => {
-                text.extend(character.escape_unicode());
-            }
-            _ if character.is_control() => text.extend(character.escape_default()),
-            _ => text.push(character),
-        }
-    }
-    text.push('"');
-    text
+    format!("\"{}\"", legible(name))
 }
 
 /// A refusal of the archive for this entry.

@@ -107,7 +107,7 @@ fn an_entry_that_is_not_for_us_is_refused_by_name() {
 }
 
 #[test]
-fn entries_that_share_a_name_or_bytes_are_refused() {
+fn f14_entries_that_share_a_name_or_bytes_are_refused() {
     let twice = |a: &str, b: &str| reason(&zip(&[member(a, "1"), member(b, "2")]));
     assert!(twice("3D/a.model", "3D/a.model").contains("is there twice"));
     assert!(twice("3D/a.model", "3d/A.Model").contains("is there twice"));
@@ -153,7 +153,7 @@ fn a_directory_that_lies_is_refused() {
 }
 
 #[test]
-fn a_claim_of_more_than_the_machine_has_is_refused_before_it_is_believed() {
+fn f14_a_claim_of_more_than_the_machine_has_is_refused_before_it_is_believed() {
     let mut bytes = Vec::new();
     end(&mut bytes, u64::MAX, u64::MAX, 0, true);
     assert!(reason(&bytes).contains("entries"));
@@ -202,13 +202,13 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(96))]
 
     #[test]
-    fn any_bytes_are_read_or_refused(bytes in prop::collection::vec(any::<u8>(), 0..300)) {
+    fn f13_any_bytes_of_an_archive_are_read_or_refused(bytes in prop::collection::vec(any::<u8>(), 0..300)) {
         let _ = contents(&bytes);
     }
 
     /// An archive with some bytes changed never gives a content that is not its checksum's, nor another name twice.
     #[test]
-    fn a_changed_archive_is_read_or_refused(changes in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..4)) {
+    fn f13_a_changed_archive_is_read_or_refused(changes in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..4)) {
         let small: Vec<Member> = sound().into_iter().filter(|member| member.content.len() < 100).collect();
         let mut bytes = zip(&small);
         for (place, byte) in changes {

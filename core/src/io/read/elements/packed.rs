@@ -5,10 +5,11 @@
 use super::cursor::{Collector, Cursor, Notes, Sink};
 use super::layout::{Layout, Scalar, ShortList, Step};
 use crate::contract::error::Result;
+use crate::io::read::limits::window;
 use crate::io::read::spool::Context;
 
 /// Bytes of rows that are read at a time by one thread, and items of their lists: an item may take one byte, and its triangle's record fifty.
-const WINDOW: usize = 256 << 10;
+const WINDOW: usize = window(256 << 10);
 const ITEMS: usize = 128 << 10;
 /// Pieces of a batch for each thread.
 const PIECES: usize = 4;

@@ -11,10 +11,11 @@ use super::layout::Layout;
 use super::lines::{Line, count, end_of, ends_line};
 use super::packed;
 use crate::contract::error::Result;
+use crate::io::read::limits::window;
 use crate::io::read::spool::Context;
 
 /// Text parsed at a time by one thread. A triangle of text takes two bytes at least, its record fifty.
-const WINDOW: usize = 256 << 10;
+const WINDOW: usize = window(256 << 10);
 /// Pieces of a batch for each thread.
 const PIECES: usize = 4;
 /// Elements that are read as tokens before they are handed over.

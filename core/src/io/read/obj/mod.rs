@@ -17,8 +17,9 @@ mod tests;
 
 use super::binary;
 use super::faces::Tally;
-use super::finding::{Finding, Rejection};
+use super::finding::{Finding, Rejection, legible_bytes};
 use super::foreign;
+use super::limits::window;
 use super::number::{COMMA, POINT};
 use super::spool::{Context, POSITION_BYTES, Parsed};
 use super::vertices::{Positions, Vertices};
@@ -30,7 +31,7 @@ use surfaces::Surfaces;
 use survey::{Statement, Survey};
 
 /// Text parsed at a time by one thread.
-const WINDOW: usize = 1 << 20;
+const WINDOW: usize = window(1 << 20);
 /// A window grows up to this to reach the end of a line; beyond that the text is no mesh.
 const LONGEST: usize = 16 * WINDOW;
 /// So much of a text is looked at to tell its kind, behind the comments that it begins with.
@@ -239,11 +240,11 @@ fn findings(bytes: &[u8], found: &Survey, cut_off: bool) -> Vec<Finding> {
         format!("{} in free form, left out", Counted(found.curves, "curve or surface", "curves and surfaces"))
     });
     note(found.unknown > 0, true, &|| {
-        let first = String::from_utf8_lossy(found.first_unknown.as_deref().unwrap_or_default()).into_owned();
+        let first = legible_bytes(found.first_unknown.as_deref().unwrap_or_default());
         format!("{} unknown to OBJ, passed over; the first is \"{first}\"", Counted(found.unknown, "statement", "statements"))
     });
     note(found.objects > 1, true, &|| {
-        let names: Vec<_> = found.names.iter().map(|name| String::from_utf8_lossy(name)).collect();
+        let names: Vec<_> = found.names.iter().map(|name| legible_bytes(name)).collect();
         let more = if found.objects > names.len() as u64 { ", …" } else { "" };
         format!("{} objects ({}{more}), read as one mesh", Count(found.objects), names.join(", "))
     });

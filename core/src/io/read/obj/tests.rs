@@ -207,7 +207,7 @@ proptest! {
     }
 
     #[test]
-    fn no_text_is_too_odd(pieces in prop::collection::vec(prop_oneof![
+    fn f13_no_obj_is_too_odd(pieces in prop::collection::vec(prop_oneof![
         "[vfplo#\\\\ 0-9./\n\r-]{0,12}", Just("v 1 2 3\n".to_owned()), Just("f 1 2 3\n".to_owned()), Just("f 1 2 3 -1".to_owned()),
     ], 0..40)) {
         let text = format!("v 0 0 0\nv 1 0 0\nv 0 1 0\n{}", pieces.concat());

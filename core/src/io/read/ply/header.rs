@@ -61,7 +61,7 @@ pub(in crate::io) fn read(bytes: &[u8]) -> Result<Header, Rejection> {
             [] | [b"comment" | b"obj_info", ..] => {}
             [b"format", name, version, ..] => {
                 form = Some(form_of(name).ok_or_else(bad)?);
-                if *version != b"1.0" {
+                if *version != b"1.0" && findings.is_empty() {
                     findings.push(Finding::flaw("a version of PLY that is not 1.0, read as 1.0"));
                 }
             }

@@ -91,7 +91,7 @@ fn no_mesh_is_refused_by_name() {
 }
 
 #[test]
-fn counts_that_lie_take_no_memory() {
+fn f14_counts_that_lie_take_no_memory() {
     let most = u64::MAX.to_string();
     let (triangles, findings) = read(&TRIANGLE.replace("face 1", &format!("face {most}")));
     assert_eq!(triangles, [CORNERS]);

@@ -13,8 +13,10 @@ use robust::{Coord, orient2d};
 
 use super::cells::{Cells, NONE};
 
-/// Steps per corner and doubling of the corners, after which a polygon crosses itself too much to be cut well.
+/// Steps per corner and doubling of the corners, after which a polygon crosses itself too much to be cut well. Of corners that repeat, there are two a
+/// position at most: bridges to holes make no more.
 const PATIENCE: usize = 64;
+const CORNERS_A_POSITION: usize = 2;
 /// Most steps, whatever the corners: a few seconds.
 const MOST_PATIENCE: usize = 1 << 26;
 /// Steps that taking a corner from a queue counts for.
@@ -22,8 +24,8 @@ const QUEUE: usize = 16;
 /// Steps that the predicates of one corner count for.
 const PREDICATES: usize = 4;
 
-/// Cuts the polygon with these corners, more than three of them.
-pub(super) fn clip(flat: impl Iterator<Item = Coord<f64>>, mut take: impl FnMut([usize; 3])) {
+/// Cuts the polygon with these corners, more than three of them. `false`: it took too long, and its last triangles are a fan.
+pub(super) fn clip(flat: impl Iterator<Item = Coord<f64>>, mut take: impl FnMut([usize; 3])) -> bool {
     let mut polygon = Polygon::of(flat.collect());
     for _ in 3..polygon.corners.len() {
         let Some(ear) = polygon.next_ear() else { break };
@@ -37,7 +39,7 @@ pub(super) fn clip(flat: impl Iterator<Item = Coord<f64>>, mut take: impl FnMut(
     loop {
         let next = polygon.corner(last).after;
         if next == first {
-            return;
+            return polygon.patience > 0;
         }
         take([first, last, next].map(|place| place as usize));
         last = next;
@@ -109,8 +111,7 @@ impl Polygon {
         let turns_left = |place: u32, corner: &Corner| orient2d(at(corner.before), at(place), at(corner.after)) > 0.0;
         let others = (0..count).zip(&corners).filter(|(place, corner)| !turns_left(*place, corner)).count();
         let cells = Cells::of(&places, others);
-        let patience = PATIENCE * places.len() * (places.len().ilog2() as usize + 1);
-        let patience = patience.min(MOST_PATIENCE);
+        let patience = patience(&places);
         let (ready, spare) = (BinaryHeap::new(), None);
         let mut polygon = Self { places, corners, cells, ready, spare, patience, any: 0 };
         (0..count).for_each(|corner| polygon.consider(corner));
@@ -349,6 +350,15 @@ impl Polygon {
             }
         }
     }
+}
+
+/// Steps that a polygon may take.
+fn patience(places: &[Coord<f64>]) -> usize {
+    let mut sorted = places.to_vec();
+    sorted.sort_unstable_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
+    sorted.dedup();
+    let corners = places.len().min(CORNERS_A_POSITION * sorted.len());
+    (PATIENCE * corners * (places.len().ilog2() as usize + 1)).min(MOST_PATIENCE)
 }
 
 /// The radius around a triangle: the smaller, the better an ear.

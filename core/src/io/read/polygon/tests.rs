@@ -133,6 +133,51 @@ fn polygons_without_a_plane_are_fans() {
     }
 }
 
+/// How a polygon is cut, whatever its triangles are; as many of them as there must be.
+fn way(polygon: &[Point]) -> Cut {
+    let mut count = 0;
+    let way = cut(polygon, |_| count += 1);
+    assert_eq!(count + 2, polygon.len());
+    way
+}
+
+#[test]
+fn a_fan_that_may_lie_outside_is_told() {
+    // Without a plane: a bow tie of five corners whose halves cancel.
+    let bow = flat(&[[0, 0], [2, 2], [2, 0], [1, 1], [0, 2]]);
+    let nan = [[f32::NAN; 3]; 5];
+    assert_eq!([way(&bow), way(&nan)], [Cut::Fan; 2]);
+    // Of corners on a line, and of one place, no triangle has an area, whatever they are.
+    let line = flat(&[[0, 0], [1, 1], [3, 3], [2, 2]]);
+    assert_eq!([way(&line), way(&[[1.0; 3]; 4])], [Cut::Whole; 2]);
+    // A convex polygon of any number of corners, and a triangle, are fans that cover it.
+    let square = |count: i16| {
+        let arc = (0..count).map(|k| [f32::from(k), f32::from(k) * f32::from(k) / 100.0, 0.0]);
+        arc.chain([[0.0, 1e6, 0.0]]).collect::<Vec<Point>>()
+    };
+    assert_eq!([way(&square(1000)), way(&flat(&[[0, 0], [1, 0], [0, 1]]))], [Cut::Whole; 2]);
+    let arrow = flat(&[[0, 0], [4, 4], [0, 2], [-4, 4], [-1, 2]]);
+    assert_eq!(way(&arrow), Cut::Whole);
+}
+
+/// Walks around nine positions that cross themselves everywhere: no corner but those that repeat is an ear.
+fn tangle(corners: usize) -> Vec<Point> {
+    let mut state = 1u32;
+    let mut any = || {
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        ((state >> 24) % 3) as f32
+    };
+    (0..corners).map(|_| [any(), any(), 0.0]).collect()
+}
+
+#[test]
+fn f13_a_polygon_of_too_many_corners_is_a_fan() {
+    let polygon = tangle(MOST_CLIPPED + 1);
+    assert_eq!(way(&polygon), Cut::Fan);
+    let first = triangles(&polygon).into_iter().take(2).collect::<Vec<_>>();
+    assert_eq!(first, [[0, 1, 2], [0, 2, 3]]);
+}
+
 #[test]
 fn a_great_comb_is_cut_soon() {
     // Deep narrow teeth: half of the corners turn right, and an ear may reach far.

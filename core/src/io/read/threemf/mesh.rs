@@ -5,6 +5,7 @@
 use std::ops::Range;
 
 use super::super::binary;
+use super::super::limits::window;
 use super::super::spool::{Context, Items, POSITION_BYTES, Parsed, Spool};
 use super::super::vertices::Vertices;
 use super::careful::{self, Piece};
@@ -15,7 +16,7 @@ use crate::contract::error::Result;
 use crate::io::record::Record;
 
 /// Text read at a time by one thread.
-const WINDOW: usize = 1 << 20;
+const WINDOW: usize = window(1 << 20);
 /// Bytes of text for a vertex or a triangle, about, for what room there should be.
 const TEXT_EACH: usize = 40;
 

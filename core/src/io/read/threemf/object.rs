@@ -4,7 +4,7 @@ use super::super::finding::Rejection;
 use super::super::package::resolve;
 use super::super::xml::{Element, Xml};
 use super::attributes::Attributes;
-use super::budget::Budget;
+use super::budget::{Budget, COMPONENT, OBJECT};
 use super::extensions::{self, BEAM_LATTICE, is_core};
 use super::model::{Component, Content, Mesh, Object, Purpose, Region};
 use super::transform::Transform;
@@ -24,10 +24,10 @@ pub(super) fn read(xml: &mut Xml<'_>, element: &Element<'_>, budget: &mut Budget
         content: Content::Nothing,
     };
     let strings = [&object.name, &object.part_number, &object.uuid, &object.thumbnail];
-    budget.spend(xml, strings.iter().map(|text| text.len()).sum())?;
+    budget.spend(xml, OBJECT + strings.iter().map(|text| text.len()).sum::<usize>())?;
     while let Some(child) = xml.child()? {
         let content = if is_core(&child, "mesh") {
-            Content::Mesh(mesh(xml, &child)?)
+            Content::Mesh(mesh(xml, &child, budget)?)
         } else if is_core(&child, "components") {
             Content::Components(components(xml, budget)?)
         } else {
@@ -59,7 +59,7 @@ fn purpose(attributes: &Attributes<'_, '_>) -> Result<Purpose, Rejection> {
     })
 }
 
-fn mesh(xml: &mut Xml<'_>, element: &Element<'_>) -> Result<Mesh, Rejection> {
+fn mesh(xml: &mut Xml<'_>, element: &Element<'_>, budget: &mut Budget) -> Result<Mesh, Rejection> {
     let whole = element.tag.clone();
     let mut mesh = Mesh { whole, vertices: Region::default(), triangles: Region::default(), lattice: false };
     while let Some(child) = xml.child()? {
@@ -76,6 +76,7 @@ fn mesh(xml: &mut Xml<'_>, element: &Element<'_>) -> Result<Mesh, Rejection> {
             return Err(xml.refuse_element(&child, "is there twice in a mesh"));
         }
         *region = self::region(xml, &child)?;
+        budget.keep(xml, &region.scopes)?;
     }
     mesh.whole.end = xml.position();
     Ok(mesh)
@@ -98,7 +99,7 @@ fn components(xml: &mut Xml<'_>, budget: &mut Budget) -> Result<Vec<Component>, 
     while let Some(child) = xml.child()? {
         if is_core(&child, "component") {
             let component = reference(&Attributes { xml, element: &child })?;
-            budget.spend(xml, component.path.as_ref().map_or(0, String::len))?;
+            budget.spend(xml, COMPONENT + component.path.as_ref().map_or(0, String::len))?;
             components.push(component);
         }
         xml.skip()?;

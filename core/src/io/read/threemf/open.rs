@@ -21,7 +21,7 @@ impl Model {
         let reject = |rejection: Rejection| rejection.at(context.path);
         let archive = Archive::open(bytes).map_err(reject)?;
         let package = Opc::open(archive, context)?;
-        let (mut parts, mut budget, mut by_name) = (Vec::new(), Budget::default(), HashMap::new());
+        let (mut parts, mut budget, mut by_name) = (Vec::new(), Budget::of(bytes.len()), HashMap::new());
         let start = package.start.clone();
         let mut known = HashSet::from([start.to_ascii_lowercase()]);
         let mut waiting = vec![start];

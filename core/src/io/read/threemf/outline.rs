@@ -6,7 +6,7 @@ use super::super::finding::Rejection;
 use super::super::spool::Items;
 use super::super::xml::{Element, Node, Xml};
 use super::attributes::Attributes;
-use super::budget::Budget;
+use super::budget::{Budget, ITEM};
 use super::extensions::{self, is_core};
 use super::model::{Item, Part, Unit};
 use super::object::{self, reference};
@@ -120,7 +120,8 @@ fn build(xml: &mut Xml<'_>, part: &mut Part, budget: &mut Budget) -> Result<(), 
                 part_number: attributes.text("partnumber")?,
                 uuid: attributes.production("UUID")?,
             };
-            budget.spend(xml, item.part_number.len() + item.uuid.len() + item.component.path.as_ref().map_or(0, String::len))?;
+            let strings = item.part_number.len() + item.uuid.len() + item.component.path.as_ref().map_or(0, String::len);
+            budget.spend(xml, ITEM + strings)?;
             part.items.push(item);
         }
         xml.skip()?;

@@ -9,6 +9,7 @@ use std::ops::Range;
 use quick_xml::Reader;
 use quick_xml::events::{BytesStart, Event};
 
+use super::super::archive::shown;
 use super::super::finding::Rejection;
 
 /// The name of the part.
@@ -40,7 +41,7 @@ pub(crate) fn volumes(text: &[u8]) -> Result<Vec<Volume>, Rejection> {
     let (mut all, mut object): (Vec<Volume>, Option<u32>) = (Vec::new(), None);
     let mut is_within = false;
     loop {
-        let event = reader.read_event().map_err(|error| refuse(error.to_string()))?;
+        let event = reader.read_event().map_err(|error| refuse(shown(&error.to_string())))?;
         match event {
             Event::Eof => return Ok(all),
             Event::DocType(_) => return Err(refuse("has a document type".into())),

@@ -178,7 +178,7 @@ fn extensions_that_are_required_and_not_understood_are_refused() {
 }
 
 #[test]
-fn builds_that_are_traps_are_refused() {
+fn f14_builds_that_are_traps_are_refused() {
     let object = |id: u32, of: &[u32]| {
         let inner: String = of.iter().map(|of| format!("<component objectid='{of}'/>")).collect();
         format!("<object id='{id}'><components>{inner}</components></object>")
@@ -261,7 +261,7 @@ proptest! {
 
     /// A model with some bytes changed is read or refused; by the scanner and without it, it is the same.
     #[test]
-    fn a_changed_model_is_read_or_refused(changes in prop::collection::vec((any::<prop::sample::Index>(), "[ -~\n]"), 1..4)) {
+    fn f13_a_changed_model_is_read_or_refused(changes in prop::collection::vec((any::<prop::sample::Index>(), "[ -~\n]"), 1..4)) {
         let mut start = object(TETRAHEDRON);
         let from = start.find("<vertices>").unwrap() + 10;
         let to = start.find("</triangles>").unwrap();
@@ -278,7 +278,7 @@ proptest! {
 
     /// The same anywhere in a model of two parts, with all that an outline looks at.
     #[test]
-    fn a_changed_outline_is_read_or_refused(changes in prop::collection::vec((any::<prop::sample::Index>(), "[ -~\n]"), 1..4)) {
+    fn f13_a_changed_outline_is_read_or_refused(changes in prop::collection::vec((any::<prop::sample::Index>(), "[ -~\n]"), 1..4)) {
         let mut start = model(
             &format!("<object id='1'>{TETRAHEDRON}</object><object id='2'><components><component objectid='1' \
                 transform='1 0 0 0 1 0 0 0 1 0 0 5'/><component objectid='1' p:path='/3D/o.model'/></components></object>"),
@@ -300,7 +300,7 @@ proptest! {
     }
 
     #[test]
-    fn any_text_is_read_or_refused(text in "[<>/a-z0-9:=\"' ]{0,200}") {
+    fn f13_any_text_in_a_model_is_read_or_refused(text in "[<>/a-z0-9:=\"' ]{0,200}") {
         let _ = mesh(&text);
         let _ = mesh(&object(&text));
         let _ = mesh(&object(&format!("<mesh><vertices>{text}</vertices></mesh>")));

@@ -11,6 +11,8 @@ use super::scopes::{LONGEST_URI, Scopes};
 
 /// Attributes of an element, at most.
 const MOST_ATTRIBUTES: usize = 256;
+/// Namespaces that are declared where an element stands, at most: all are looked at for each name, and real files declare a dozen.
+const MOST_SCOPES: usize = 64;
 /// Bytes of a value that is asked for, at most.
 const LONGEST_VALUE: usize = 64 << 10;
 
@@ -62,7 +64,7 @@ impl<'a> Element<'a> {
                 Some(prefix) => scopes.declare(prefix, &plain(value)?),
             }
             // Those that declare something are counted as well, or their number would have no bound.
-            if scopes.len() > 64 * MOST_ATTRIBUTES {
+            if scopes.len() > MOST_SCOPES {
                 return Err("declares too many namespaces".into());
             }
         }

@@ -17,6 +17,16 @@ impl Scopes {
         self.0.len()
     }
 
+    /// Both are one list, which takes no more memory than one of them.
+    pub(crate) fn is_shared(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.0, &other.0)
+    }
+
+    /// Bytes that the list takes.
+    pub(crate) fn bytes(&self) -> usize {
+        self.0.iter().map(|(prefix, uri)| 64 + prefix.len() + uri.len()).sum()
+    }
+
     pub(super) fn declare(&mut self, prefix: &str, uri: &str) {
         Arc::make_mut(&mut self.0).push((prefix.into(), uri.into()));
     }

@@ -1,0 +1,154 @@
+//! All that a 3MF package builds, as one mesh.
+//!
+//! **In:** a model, and which of its objects are wanted.
+//! **Out:** the records of each object where build items and components place it, in the order of the build.
+//! **Promise:** each object is read once, however often it is placed. Copies are bounded by the size of the file.
+
+use std::collections::HashMap;
+use std::ops::Range;
+
+use super::binary;
+use super::finding::{Finding, Loss, Rejection};
+use super::limits::most_copies;
+use super::rounding::Rounding;
+use super::spool::{Context, Parsed, Spool};
+use super::threemf::{MeshRecords, Model, Object, Place, Transform};
+use crate::contract::error::Result;
+use crate::io::record::{self, Record};
+use crate::util::words::Counted;
+
+/// Records that are placed at once.
+const PLACED: usize = 16 << 10;
+/// Findings of objects that are told one by one.
+const TOLD: usize = 16;
+
+/// The mesh of a build in a file of so many bytes, of the objects that are `wanted`. Call it within a pool of threads.
+///
+/// # Errors
+/// Those of reading an object, [`crate::Error::Unreadable`] without a triangle, [`crate::Error::Refused`] for too many copies.
+pub(super) fn mesh(model: &Model, wanted: fn(&Object) -> bool, bytes: usize, context: &Context<'_>) -> Result<Parsed> {
+    let mut times: HashMap<Place, u64> = HashMap::new();
+    each(model, wanted, |place, _| {
+        *times.entry(place).or_default() += 1;
+        Ok(())
+    })?;
+    let mut reading = Reading { model, context, findings: Vec::new(), unsaid: Vec::new() };
+
+    let (mut kept, mut where_kept, mut copies) = (context.records()?, HashMap::new(), 0u64);
+    let mut again: Vec<(Place, u64)> = times.into_iter().filter(|(_, times)| *times > 1).collect();
+    again.sort_unstable();
+    for (place, times) in again {
+        let from = kept.count() as usize;
+        kept.append(reading.read(place)?.parsed.records.all())?;
+        let here = from..kept.count() as usize;
+        copies = copies.saturating_add((times - 1).saturating_mul(here.len() as u64));
+        where_kept.insert(place, here);
+    }
+    if copies > most_copies(bytes) {
+        return Err(Rejection::Copies(most_copies(bytes)).at(context.path));
+    }
+    let kept = kept.map()?;
+
+    let mut placing = Placing { context, spool: context.records()?, rounding: Rounding::default() };
+    each(model, wanted, |place, transform| match where_kept.get(&place) {
+        Some(range) => placing.add(part(kept.all(), range), transform),
+        None => placing.add(reading.read(place)?.parsed.records.all(), transform),
+    })?;
+    let Placing { spool, rounding, .. } = placing;
+    if spool.count() == 0 {
+        return Err(binary::no_triangles().at(context.path));
+    }
+    Ok(Parsed {
+        records: spool.map()?,
+        findings: [model.findings.clone(), reading.findings()].concat(),
+        header: binary::header_of(b""),
+        rounding: rounding.if_any(),
+        unit: Some(model.unit().name()),
+        positions: None,
+        coloured: false,
+    })
+}
+
+/// Calls `place` for each object that is wanted, where it is built, until it fails.
+fn each(model: &Model, wanted: fn(&Object) -> bool, mut place: impl FnMut(Place, &Transform) -> Result<()>) -> Result<()> {
+    let mut done = Ok(());
+    for item in model.items() {
+        model.instances(item, |at, transform| {
+            if done.is_ok() && model.object(at).is_some_and(wanted) {
+                done = place(at, transform);
+            }
+        });
+    }
+    done
+}
+
+fn part<'r>(records: &'r [Record], range: &Range<usize>) -> &'r [Record] {
+    records.get(range.clone()).unwrap_or_default()
+}
+
+/// Objects that are read, and what is odd about them.
+struct Reading<'a> {
+    model: &'a Model,
+    context: &'a Context<'a>,
+    findings: Vec<Finding>,
+    /// Beyond those: at most one for each way in which they weigh.
+    unsaid: Vec<(Finding, u64)>,
+}
+
+impl Reading<'_> {
+    fn read(&mut self, place: Place) -> Result<MeshRecords> {
+        let mut read = self.model.records(place, self.context)?;
+        std::mem::take(&mut read.parsed.findings).into_iter().for_each(|finding| self.note(finding));
+        Ok(read)
+    }
+
+    fn note(&mut self, finding: Finding) {
+        if self.findings.contains(&finding) {
+            return;
+        }
+        if self.findings.len() < TOLD {
+            return self.findings.push(finding);
+        }
+        match self.unsaid.iter_mut().find(|(of, _)| (of.harmless, of.loss) == (finding.harmless, finding.loss)) {
+            Some((_, count)) => *count += 1,
+            None => self.unsaid.push((finding, 1)),
+        }
+    }
+
+    fn findings(self) -> Vec<Finding> {
+        let unsaid = self.unsaid.into_iter().map(|(finding, count)| {
+            let kind = match finding.loss {
+                Loss::None => "other objects",
+                Loss::IfOpen | Loss::Certain => "other objects, of which triangles are lost",
+            };
+            Finding { text: format!("{} of {kind}", Counted(count, "more oddity", "more oddities")), ..finding }
+        });
+        self.findings.into_iter().chain(unsaid).collect()
+    }
+}
+
+/// Objects on their way to where they are built.
+struct Placing<'a> {
+    context: &'a Context<'a>,
+    spool: Spool<'a, 50>,
+    rounding: Rounding,
+}
+
+impl Placing<'_> {
+    fn add(&mut self, records: &[Record], transform: &Transform) -> Result<()> {
+        for chunk in records.chunks(PLACED) {
+            let placed: Vec<Record> = chunk.iter().map(|record| placed(record, transform, &mut self.rounding)).collect();
+            self.spool.append(&placed)?;
+        }
+        self.context.at(self.spool.count(), self.spool.count())
+    }
+}
+
+fn placed(record: &Record, transform: &Transform, rounding: &mut Rounding) -> Record {
+    if transform.is_identity() {
+        return *record;
+    }
+    let [a, b, c] = record::corners(record).map(|corner| transform.apply(corner.map(f64::from)).map(|x| rounding.of_double(x)));
+    // A mirror image is turned inside out.
+    record::encode(if transform.mirrors() { [a, c, b] } else { [a, b, c] }, record::attribute(record))
+}

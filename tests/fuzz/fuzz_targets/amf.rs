@@ -1,0 +1,7 @@
+//! AMF.
+#![no_main]
+
+use libfuzzer_sys::fuzz_target;
+use suture_fuzz::Reader;
+
+fuzz_target!(|bytes: &[u8]| suture_fuzz::check(Reader::Amf, bytes));

@@ -1,0 +1,7 @@
+//! The text of an AMF in an archive.
+#![no_main]
+
+use libfuzzer_sys::fuzz_target;
+use suture_fuzz::Reader;
+
+fuzz_target!(|bytes: &[u8]| suture_fuzz::check(Reader::Archive, &suture_fuzz::packed_amf(bytes)));

@@ -1,0 +1,144 @@
+//! Small files to begin with, by target: the forms that the tests of the whole program write, and odd ones that few programs write.
+
+use crate::BETWEEN;
+use crate::forms::{self, Form};
+use crate::stl::{self, Triangle};
+use crate::zip;
+
+/// The seeds of all targets.
+pub fn all() -> Vec<(&'static str, Vec<Vec<u8>>)> {
+    let boxes = stl::cuboid([0.0, 0.5, -1.25], [10.0, 20.5, 30.75]);
+    let write = |form| forms::write(form, &boxes);
+    let text = stl::text("box", &boxes);
+    let with = |first: Vec<Vec<u8>>, more: &[&str]| [first, more.iter().map(|seed| seed.as_bytes().to_vec()).collect()].concat();
+    let binary_off = off_binary(&boxes);
+    vec![
+        ("stl", vec![stl::mesh(&boxes), stl::mesh(&boxes[..1]), text.clone().into(), write(Form::PlyBig), write(Form::Obj)]),
+        ("stl_text", with(vec![text.clone().into(), text.replace('.', ",").into(), text.replace('\n', "\r").into()], &TEXT)),
+        ("ply", with(vec![write(Form::PlyText), write(Form::PlyBinary), write(Form::PlyBig), ply_strips()], &PLY)),
+        ("off", with(vec![write(Form::Off), binary_off], &OFF)),
+        ("obj", with(vec![write(Form::Obj)], &OBJ)),
+        ("amf", with(vec![write(Form::Amf)], &AMF)),
+        ("amf_packed", with(vec![write(Form::Amf)], &AMF)),
+        (
+            "threemf",
+            vec![
+                write(Form::ThreeMf),
+                write(Form::PackedAmf),
+                project(&boxes),
+                zip::write(&[("a/", b""), ("a/b.amf", b"<amf/>")], 0),
+            ],
+        ),
+        ("threemf_model", models(&boxes)),
+        ("threemf_parts", vec![parts(&boxes)]),
+    ]
+}
+
+const TEXT: [&str; 2] = [
+    "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1e0 0 0\nvertex 1 1 nan\nvertex 0 1 0\nendloop\nendfacet\nendsolid a\nsolid b\n",
+    "\u{feff}  SOLID \u{f6}\r\nFACET NORMAL 0 0 1 OUTER LOOP VERTEX 0 0 0 VERTEX 1 0 0 VERTEX 1,5 1 0 ENDLOOP ENDFACET",
+];
+
+const PLY: [&str; 3] = [
+    "ply\r\nformat ascii 1.0\r\ncomment \u{e9}\r\nelement vertex 4\r\nproperty double x\r\nproperty double y\r\nproperty double z\r\nelement face 1\r\n\
+     property list uchar short vertex_index\r\nproperty list uchar float texcoord\r\nend_header\r\n0 0 0\r\n1 0 0\r\n1 1 0\r\n0 1 nan\r\n4 0 1 2 3 2 .5 .5\r\n",
+    "ply\nformat ascii 1.0\nobj_info x\nelement extra 1\nproperty list uint int a\nelement vertex 3\nproperty float32 z\nproperty float y\nproperty float x\n\
+     element face 4294967295\nproperty uchar flags\nproperty list uint8 int32 vertex_indices\nend_header\n2 7 7\n0 0 0\n1 0 0\n1 1 0\n1 3 0 1 2\n",
+    "ply\rformat ascii 1.0\relement vertex 5\rproperty int x\rproperty int y\rproperty int z\relement tristrips 1\rproperty list int int vertex_indices\r\
+     end_header\r0 0 0\r1 0 0\r1 1 0\r0 1 0\r2 2 2\r7 0 1 2 3 -1 4 0\r",
+];
+
+const OFF: [&str; 4] = [
+    "OFF # a comment\n4 2 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n3 0 1 2 255 0 0\n3 0 2 3 0.5 0.5 0.5 1\n",
+    "STCNOFF 3 1 0 0 0 0 0 0 1 1 1 1 1 0 0 1 0 0 0 0 1 1 1 1 1 0 0 0 1 0 0 0 1 1 1 1 1 0 0 3 0 1 2",
+    "OFF4 3 0\r0 0 0\r1 0 0\r1 1 0\r0 1 0\r4 0 1 2 3\r3 0 1 9\r2 0 1\r",
+    "4 2 5\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n3 0 1 2\n3 0 2 3\n",
+];
+
+const OBJ: [&str; 3] = [
+    "o a\r\nv 0 0 0\r\nv 1 0 0 1.0\r\nv 1 1 0 .5 .5 .5\r\nvt 0 0\r\nvn 0 0 1\r\ng b\r\nusemtl c\r\ns off\r\nf 1/1/1 2/1/1 3//1\r\nf -3 -2 -1\r\nl 1 2\r\np 1\r\n",
+    "v 0,5 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv .5 .5 0\nf 1 2 \\\n3 4\nf 1 5 2 3 4\ncurv 0 1 1 2\nf 1 2\nf 1 2 99\n",
+    "# \u{e9}\rmtllib x.mtl\rv 1e400 nan 0\rv 1 0 0\rv 1 1 0\rf 1 2 3\rf 1/2 2/3 3/",
+];
+
+const AMF: [&str; 3] = [
+    "<amf unit=\"inch\"><constellation id=\"9\"><instance objectid=\"1\"><deltax>5</deltax><rz>90</rz></instance><instance objectid=\"1\"/></constellation>\
+     <object id=\"1\"><mesh><vertices><vertex><coordinates><x>0</x><y>0</y><z>0</z></coordinates><color><r>1</r></color></vertex><vertex><coordinates><x>1</x>\
+     <y>0</y><z>0</z></coordinates></vertex><vertex><coordinates><x>1</x><y>1</y><z>0</z></coordinates></vertex></vertices><volume materialid=\"2\">\
+     <metadata type=\"name\">a &amp; b</metadata><triangle><v1>0</v1><v2>1</v2><v3>2</v3></triangle></volume><volume><triangle><v1>2</v1><v2>1</v2>\
+     <v3>0</v3></triangle></volume></mesh></object></amf>",
+    "<?xml version=\"1.0\" encoding=\"utf-8\"?>\r\n<!-- a --><amf xmlns:x=\"y\"><object id='1'><mesh><vertices><vertex><coordinates><x> 0 </x><y><![CDATA[0]]></y>\
+     <z>0</z></coordinates><normal><nx>0</nx></normal></vertex><edge/></vertices><volume><triangle><v1>0</v1><v2>0</v2><v3>9</v3></triangle></volume></mesh>\
+     </object></amf>",
+    "<!DOCTYPE amf [<!ENTITY a \"b\">]><amf><material id=\"1\"/><texture/><metadata type=\"&a;\">&#x41;</metadata><constellation id=\"1\"><instance objectid=\"1\"/>\
+     </constellation></amf>",
+];
+
+/// Vertices, and two strips of them.
+fn ply_strips() -> Vec<u8> {
+    let mut bytes = b"ply\nformat binary_little_endian 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\nelement tristrips 1\n\
+        property list int int vertex_indices\nend_header\n"
+        .to_vec();
+    bytes.extend([0f32, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 1.0, 0.0].map(f32::to_le_bytes).as_flattened());
+    bytes.extend([6i32, 0, 1, 2, -1, 3, 1].map(i32::to_le_bytes).as_flattened());
+    bytes
+}
+
+fn off_binary(triangles: &[Triangle]) -> Vec<u8> {
+    let (positions, faces) = forms::indexed(triangles);
+    let mut bytes = b"OFF BINARY\n".to_vec();
+    bytes.extend([positions.len() as u32, faces.len() as u32, 0].map(u32::to_be_bytes).as_flattened());
+    bytes.extend(positions.as_flattened().iter().flat_map(|x| x.to_be_bytes()));
+    for [a, b, c] in faces {
+        bytes.extend([3, a as u32, b as u32, c as u32, 0].map(u32::to_be_bytes).as_flattened());
+    }
+    bytes
+}
+
+/// Models of one object, and of objects in objects.
+fn models(triangles: &[Triangle]) -> Vec<Vec<u8>> {
+    let indexed = forms::indexed(triangles);
+    let painted = forms::mesh_of_model(&indexed, |k| {
+        if k % 3 == 0 { " slic3rpe:mmu_segmentation=\"4C\" pid=\"1\" p1=\"0\"".into() } else { String::new() }
+    });
+    let simple = forms::model(&format!("<object id=\"1\" type=\"model\">{painted}</object>"), "<item objectid=\"1\"/>");
+    let nested = forms::model(
+        &format!(
+            "<basematerials id=\"7\"><base name=\"a\" displaycolor=\"#FF0000\"/></basematerials><object id=\"1\" name=\"a &lt; b\">{painted}</object>\
+             <object id=\"2\" type=\"support\"><components><component objectid=\"1\" transform=\"1 0 0 0 1 0 0 0 1 5 5 5\"/><component objectid=\"1\"/>\
+             </components></object><object id=\"3\"><components><component objectid=\"2\" transform=\"-1 0 0 0 1 0 0 0 1 0 0 0\"/></components></object>"
+        ),
+        "<item objectid=\"3\" printable=\"0\" transform=\"0 1 0 -1 0 0 0 0 1 0 0 0\"/><item objectid=\"1\"/>",
+    );
+    // Nothing is plain: other quotes, prefixes, comments, character data between elements, entities in numbers.
+    let careful = "<?xml version='1.0'?><m:model unit='inch' xmlns:m='http://schemas.microsoft.com/3dmanufacturing/core/2015/02' requiredextensions=''>\
+        <m:resources><m:object id='1'><m:mesh><m:vertices><!-- a --><m:vertex x='0' y='0' z='0'></m:vertex> <m:vertex z='1' x='&#49;' y='0'/><m:vertex x='1' y='1' \
+        z='0'/></m:vertices><m:triangles><m:triangle v1='0' v2='1' v3='2'><?pi?></m:triangle></m:triangles></m:mesh></m:object></m:resources><m:build><m:item \
+        objectid='1'/></m:build></m:model>";
+    vec![simple.into(), nested.into(), careful.into()]
+}
+
+/// A slicer's project: objects in a part of their own, and volumes of one.
+fn project(triangles: &[Triangle]) -> Vec<u8> {
+    crate::package_of_parts(&parts(triangles))
+}
+
+fn parts(triangles: &[Triangle]) -> Vec<u8> {
+    let mesh = forms::mesh_of_model(&forms::indexed(triangles), |_| String::new());
+    let other = forms::model(&format!("<object id=\"5\">{mesh}</object>"), "");
+    let objects = format!(
+        "<object id=\"1\">{mesh}</object><object id=\"2\"><components><component p:path=\"/3D/Objects/a.model\" objectid=\"5\"/></components></object>"
+    );
+    let model = forms::model(&objects, "<item objectid=\"1\"/><item objectid=\"2\"/>").replacen(
+        "<model ",
+        "<model xmlns:p=\"http://schemas.microsoft.com/3dmanufacturing/production/2015/06\" requiredextensions=\"p\" ",
+        1,
+    );
+    let relationships = "<Relationships xmlns=\"http://schemas.openxmlformats.org/package/2006/relationships\"><Relationship Target=\"/3D/Objects/a.model\" \
+        Id=\"r\" Type=\"http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel\"/></Relationships>";
+    let config = "<?xml version=\"1.0\" encoding=\"UTF-8\"?><config><object id=\"1\"><volume firstid=\"0\" lastid=\"5\"><metadata type=\"volume\" \
+        key=\"volume_type\" value=\"ModelPart\"/></volume><volume firstid=\"6\" lastid=\"11\"><metadata key=\"modifier\" value=\"1\"/></volume></object></config>";
+    let sound = forms::parts(&model, &[]);
+    let [types, rels] = [0, 1].map(|k| sound[k].1);
+    [types, rels, model.as_bytes(), relationships.as_bytes(), other.as_bytes(), config.as_bytes()].join(&BETWEEN)
+}

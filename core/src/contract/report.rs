@@ -90,7 +90,7 @@ pub struct Report {
     /// together, and an outcome is the worst of theirs.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub objects: Vec<ObjectReport>,
-    /// The fate of colours, paint and other attributes of triangles; `None` where the file has none, or its format's are not carried over.
+    /// The fate of colours, paint and other attributes of triangles; `None` where the file has none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub attributes: Option<AttributesKept>,
     /// Walls thinner than the profile's minimum; `None` if there is no minimum, or a hint says why it was not looked.

@@ -48,7 +48,7 @@ pub(crate) fn repair(input: &Path, output: &Path, profile: &Profile, limits: &Li
     let triangles = mesh.records().len();
     let target = formats::target(mesh.format(), mesh.unit(), profile.format);
     let report = match target.layout {
-        None => files::make(mesh, output, target.is_input, (profile, limits), progress, &mut clock)?.report,
+        None => formats::into_stl(mesh, output, target, Work { profile, limits, progress }, &mut clock)?,
         Some(layout) => {
             let make = |mesh, spool: &Path, clock: &mut Clock| {
                 files::make(mesh, spool, target.is_input, (profile, limits), progress, clock)

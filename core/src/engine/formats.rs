@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use crate::contract::error::{Error, Result};
 use crate::contract::progress::Progress;
 use crate::contract::report::{Converted, Format, Report};
-use crate::contract::settings::{Limits, OutputFormat, folder_of};
+use crate::contract::settings::{KeepAttributes, Limits, OutputFormat, folder_of};
 use crate::engine::carried;
 use crate::engine::clock::Clock;
 use crate::engine::files::{self, Made};
@@ -85,6 +85,27 @@ fn layout_of(format: Format, unit: Option<&'static str>) -> Option<Layout> {
         Format::Ply => Some(Layout::Ply),
         Format::Off => Some(Layout::Off),
     }
+}
+
+/// Makes `mesh` the new STL `output`, in which there is no place for what its file says besides positions and faces.
+///
+/// # Errors
+/// [`Error`], any of them.
+pub(crate) fn into_stl(mesh: MeshFile, output: &Path, target: Target, work: Work<'_>, clock: &mut Clock) -> Result<Report> {
+    let Work { profile, limits, progress } = work;
+    let loses = !target.is_input && !matches!(Said::by(&mesh), Said::Nothing);
+    let triangles = mesh.records().len() as u64;
+    // A result that the profile refuses is never at its place.
+    let nameless = if loses && profile.attributes == KeepAttributes::Refuse { Some(Nameless::new(limits)?) } else { None };
+    let place = nameless.as_ref().map(Nameless::path);
+    let output = place.as_deref().unwrap_or(output);
+    let mut report = files::make(mesh, output, target.is_input, (profile, limits), progress, clock)?.report;
+    if loses && report.output.is_some() {
+        let account = Account { lost: triangles, ..Account::default() };
+        report.attributes = Some(account.told());
+        carried::heed(&mut report, profile, carried::harm(account));
+    }
+    Ok(report)
 }
 
 /// Makes `mesh` of `input` the new file `output` in `layout`, by an STL that `make` writes. What the file says besides positions and faces is kept

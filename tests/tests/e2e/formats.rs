@@ -63,6 +63,23 @@ fn a_repaired_file_keeps_its_format() {
 }
 
 #[test]
+fn a_repaired_text_goes_on_behind_its_last_line() {
+    let place = Place::new();
+    let text = forms::write(Form::Obj, &open_box());
+    place.put("in.obj", &text);
+    let report = place.repair("in.obj", "out.obj", &[]).expect(0).report();
+    let counts = ["kept", "inherited", "lost"].map(|kind| report["attributes"][kind].clone());
+    assert_eq!(counts, [11, 1, 0].map(Value::from), "{report}");
+    let output = place.read("out.obj");
+    let new = output.strip_prefix(text.as_slice()).map(String::from_utf8_lossy).unwrap();
+    assert!(new.starts_with("f ") && new.lines().count() == 1, "{new}");
+    // Another format has no place for what the text says.
+    place.put("keep.toml", b"attributes = \"keep\"");
+    let report = place.repair("in.obj", "out.stl", &["--profile", "keep.toml"]).expect(1).report();
+    assert_eq!((&report["outcome"], &report["attributes"]["lost"]), (&"needs_review".into(), &11.into()), "{report}");
+}
+
+#[test]
 fn a_clean_file_is_copied_byte_for_byte() {
     for form in Form::ALL {
         let place = Place::new();

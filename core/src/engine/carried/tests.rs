@@ -351,11 +351,13 @@ fn a_profile_may_refuse_to_lose_what_a_file_says() {
         let result = repaired("obj", text.as_bytes(), &profile);
         (result.report.outcome, result.output.is_empty(), result.report.attributes.unwrap().lost)
     };
-    use crate::contract::settings::OutputFormat::{Input, Ply};
+    use crate::contract::settings::OutputFormat::{Input, Ply, Stl};
     assert_eq!(outcome(KeepAttributes::Refuse, Input), (Outcome::Repaired, false, 0));
-    assert_eq!(outcome(KeepAttributes::Best, Ply), (Outcome::Repaired, false, 11));
-    assert_eq!(outcome(KeepAttributes::Keep, Ply), (Outcome::NeedsReview, false, 11));
-    assert_eq!(outcome(KeepAttributes::Refuse, Ply), (Outcome::NotGood, true, 11));
+    for other in [Ply, Stl] {
+        assert_eq!(outcome(KeepAttributes::Best, other), (Outcome::Repaired, false, 11));
+        assert_eq!(outcome(KeepAttributes::Keep, other), (Outcome::NeedsReview, false, 11));
+        assert_eq!(outcome(KeepAttributes::Refuse, other), (Outcome::NotGood, true, 11));
+    }
 }
 
 /// A torus of 2 × 12 × 8 triangles.

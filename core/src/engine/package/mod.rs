@@ -70,6 +70,14 @@ pub(crate) fn repair_as(package: &PackageFile, output: &Path, work: Work<'_>, cl
     let spool = Nameless::new(work.limits)?;
     let mut report = repair(package, &spool.path(), work, clock)?;
     if report.output.is_some() {
+        // No other format has a place for them.
+        if let Some(own) = report.attributes {
+            let account = Account { lost: own.kept + own.lost, ..Account::default() };
+            report.attributes = Some(account.told());
+            if !carried::heed(&mut report, work.profile, carried::harm(account)) {
+                return Ok(report);
+            }
+        }
         let converted = formats::convert(&spool.path(), output, work.profile.format, work.limits, work.progress)?;
         clock.stage("encode");
         report.output = Some(converted.output);

@@ -1,7 +1,7 @@
 use std::path::Path;
 
 use crate::contract::report::{Outcome, Report};
-use crate::contract::settings::{KeepAttributes, Limits, Profile};
+use crate::contract::settings::{KeepAttributes, Limits, OutputFormat, Profile};
 use crate::io::read::archive_build::{Member, member, zip};
 use crate::io::read::{Archive, PackageFile};
 use crate::output::model::Elements;
@@ -186,6 +186,11 @@ fn a_profile_may_refuse_to_lose_attributes() {
     assert_eq!(outcome(KeepAttributes::Best), (Outcome::Repaired, true));
     assert_eq!(outcome(KeepAttributes::Keep), (Outcome::NeedsReview, true));
     assert_eq!(outcome(KeepAttributes::Refuse), (Outcome::NotGood, false));
+    // No other format has a place for paint.
+    let input = package(&[object(1, &vertices(), &triangles(&BOX, |_| mmu("4")))], &[]);
+    let profile = Profile { attributes: KeepAttributes::Keep, format: OutputFormat::Ply, ..Profile::default() };
+    let report = Repaired::of(&input, &profile).report;
+    assert_eq!((report.outcome, report.attributes.map(|attributes| attributes.lost)), (Outcome::NeedsReview, Some(12)));
 }
 
 fn with_sets(id: u32, of: &[[usize; 3]], references: &str) -> String {

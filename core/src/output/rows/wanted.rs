@@ -10,12 +10,15 @@ use crate::geometry::position;
 use crate::io::record::{self, Point};
 use crate::io::rows::{CHANNELS, Corner, NONE, Rows, Source, VERTICES};
 use crate::output::model::{Change, Fate};
+use crate::util::bits;
 
 /// What the changed triangles need.
 #[derive(Default)]
 pub(super) struct Wanted {
     /// By the bits of a position: its number.
     numbers: HashMap<[u32; 3], u32>,
+    /// A bit for each of [`filtered`] of those: most positions of a file are told by it not to be among them.
+    filter: Vec<u64>,
     /// By number.
     pub(super) points: Vec<Point>,
     /// By number: a corner of the file there, and whether it is one of a triangle that stays.
@@ -40,6 +43,12 @@ impl Wanted {
         let mut wanted = Self::default();
         wanted.list(change);
         wanted.there = vec![None; wanted.points.len()];
+        let mut filter = vec![0; wanted.points.len().next_power_of_two() / 4 + 1];
+        for position in wanted.numbers.keys() {
+            let bit = filtered(*position, filter.len());
+            bits::put(&mut filter, bit);
+        }
+        wanted.filter = filter;
         let mut votes = Votes::of(&wanted.made);
         walk(rows, change, |step| wanted.look(rows, step, &mut votes))?;
         for made in &wanted.made {
@@ -130,7 +139,11 @@ impl Wanted {
         }
         let corners = own.corners();
         let numbers = corners.map(|corner| {
-            let number = *self.numbers.get(&position::bits(rows.position(corner[VERTICES])?))?;
+            let at = position::bits(rows.position(corner[VERTICES])?);
+            if !bits::holds(&self.filter, filtered(at, self.filter.len())) {
+                return None;
+            }
+            let number = *self.numbers.get(&at)?;
             let there = self.there.get_mut(number as usize)?;
             // A triangle that stays tells more of a place than one that does not.
             let is_better = there.is_none_or(|(_, stays)| votes.is_some() && !stays);
@@ -156,4 +169,11 @@ impl Wanted {
             _ => self.in_place.push(from..self.result),
         }
     }
+}
+
+/// One of the bits of so many words, by the bits of a position.
+fn filtered([x, y, z]: [u32; 3], words: usize) -> usize {
+    let mixed = (u64::from(x) ^ u64::from(y).rotate_left(21) ^ u64::from(z).rotate_left(42)).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    // The upper half of a product depends on all bits.
+    (mixed >> 32) as usize % (words * 64)
 }

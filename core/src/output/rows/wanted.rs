@@ -17,7 +17,7 @@ use crate::util::bits;
 pub(super) struct Wanted {
     /// By the bits of a position: its number.
     numbers: HashMap<[u32; 3], u32>,
-    /// A bit for each of [`filtered`] of those: most positions of a file are told by it not to be among them.
+    /// A bit for each of those, by [`filtered`]: most positions of a file are told by it not to be among them.
     filter: Vec<u64>,
     /// By number.
     pub(super) points: Vec<Point>,
@@ -44,8 +44,8 @@ impl Wanted {
         wanted.list(change);
         wanted.there = vec![None; wanted.points.len()];
         let mut filter = vec![0; wanted.points.len().next_power_of_two() / 4 + 1];
-        for position in wanted.numbers.keys() {
-            let bit = filtered(*position, filter.len());
+        for point in &wanted.points {
+            let bit = filtered(position::bits(*point), filter.len());
             bits::put(&mut filter, bit);
         }
         wanted.filter = filter;

@@ -22,7 +22,9 @@ pub(super) struct Tally {
     pub(super) fans: u64,
     /// The number of the first of them among all faces, from 1.
     pub(super) first_fan: Option<u64>,
-    /// With an index that no vertex has, or of more corners than a face can have; left out.
+    /// Of more corners than a face can have; left out.
+    pub(super) huge: u64,
+    /// With an index that no vertex has; left out.
     pub(super) astray: u64,
     /// The number of the first of them among all faces, from 1.
     pub(super) first_astray: Option<u64>,
@@ -37,11 +39,17 @@ impl Tally {
         self.short += behind.short;
         self.polygons += behind.polygons;
         self.fans += behind.fans;
+        self.huge += behind.huge;
         self.astray += behind.astray;
     }
 
     /// Refuses faces that are lost for the most part.
     pub(super) fn judge(&self) -> Result<(), Rejection> {
+        if self.huge > self.faces / 2 {
+            let faces = Counted(self.faces, "face", "faces");
+            let reason = format!("{} of {faces} have more than {} corners", Count(self.huge), Count(MOST_CORNERS));
+            return Err(Rejection::Unreadable(reason));
+        }
         if self.astray > self.faces / 2 {
             let faces = Counted(self.faces, "face", "faces");
             let reason = format!("{} of {faces} refer to vertices that are not there", Count(self.astray));
@@ -60,6 +68,10 @@ impl Tally {
                 "{faces} to vertices that are not there, left out; the first is face {}",
                 Count(first)
             )));
+        }
+        if self.huge > 0 {
+            let faces = Counted(self.huge, "face", "faces");
+            found.push(Finding::loss(format!("{faces} of more than {} corners, left out", Count(MOST_CORNERS))));
         }
         if self.short > 0 {
             found.push(Finding::flaw(format!("{} of fewer than three corners, left out", Counted(self.short, "face", "faces"))));
@@ -113,7 +125,8 @@ impl<'v> Faces<'v> {
     pub(super) fn polygon(&mut self, indices: impl ExactSizeIterator<Item = u64>) {
         self.tally.faces += 1;
         if indices.len() > MOST_CORNERS {
-            return self.astray();
+            self.tally.huge += 1;
+            return;
         }
         self.corners.clear();
         for index in indices {
@@ -137,7 +150,13 @@ impl<'v> Faces<'v> {
         }
     }
 
-    /// Counts a face whose indices are not there, or too many.
+    /// Counts a face of too many corners.
+    pub(super) fn huge(&mut self) {
+        self.tally.faces += 1;
+        self.tally.huge += 1;
+    }
+
+    /// Counts a face whose indices are not there.
     pub(super) fn lost(&mut self) {
         self.tally.faces += 1;
         self.astray();
@@ -176,6 +195,18 @@ mod tests {
         all.append(expected);
         assert_eq!(all, Tally { faces: 10, short: 2, polygons: 2, astray: 4, first_astray: Some(4), ..Tally::default() });
         assert!(all.judge().is_ok() && Tally { faces: 3, astray: 2, ..Tally::default() }.judge().is_err());
+    }
+
+    #[test]
+    fn f13_a_face_of_too_many_corners_is_refused_by_name() {
+        let points = [[0.0; 3], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0]].map(packed);
+        let mut faces = Faces::of(Vertices::spooled(&points));
+        faces.polygon(vec![0u64; MOST_CORNERS + 1].into_iter());
+        let said = format!("{:?}", faces.tally.judge());
+        assert!(said.contains("1 of 1 face have more than 524 288 corners") && faces.records.is_empty(), "{said}");
+        (0..2).for_each(|_| faces.triangle([0, 1, 2]));
+        let found = faces.tally.findings();
+        assert!(faces.tally.judge().is_ok() && found[0].text == "1 face of more than 524 288 corners, left out");
     }
 
     #[test]

@@ -33,7 +33,7 @@ impl<'v> Made<'v> {
             self.faces.triangle(triangle);
         } else if corners > MOST_CORNERS {
             cursor.skip(corners, corners.checked_mul(kind.bytes())?)?;
-            self.faces.lost();
+            self.faces.huge();
         } else {
             self.indices.clear();
             for _ in 0..corners {

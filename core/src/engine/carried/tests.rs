@@ -151,8 +151,10 @@ fn ply(mesh: &Mesh, form: Form, names: [&str; 2], red: impl Fn(usize) -> u8) -> 
     numbers.1
 }
 
-/// Of each face: positions, values of the field, red, and the normal in x.
-fn read_ply(bytes: &[u8]) -> Vec<(Vec<Point>, Vec<[f32; 2]>, u8, f32)> {
+/// A face of a PLY: positions, values of the field, red, and the normal in x.
+type Face = (Vec<Point>, Vec<[f32; 2]>, u8, f32);
+
+fn read_ply(bytes: &[u8]) -> Vec<Face> {
     let end = bytes.windows(11).position(|window| window == b"end_header\n").unwrap() + 11;
     let head = std::str::from_utf8(&bytes[..end]).unwrap();
     let count = |name: &str| {
@@ -384,11 +386,11 @@ fn an_amf_says_that_colours_are_lost() {
     let colour = "<color><r>1</r><g>0</g><b>0</b></color>";
     assert_eq!(repaired("amf", plain.as_bytes(), &Profile::default()).report.attributes, None);
     for (before, after) in [
-        ("<volume>", format!("<volume materialid=\"2\">")),
+        ("<volume>", "<volume materialid=\"2\">".to_owned()),
         ("<volume>", format!("<volume>{colour}")),
         ("<object id", format!("<material id=\"2\">{colour}</material><object id")),
         ("</vertex>", format!("{colour}</vertex>")),
-        ("</triangle>", format!("<texmap rtexid=\"1\"><utex1>0</utex1></texmap></triangle>")),
+        ("</triangle>", "<texmap rtexid=\"1\"><utex1>0</utex1></texmap></triangle>".to_owned()),
     ] {
         let text = plain.replacen(before, &after, 1);
         let attributes = repaired("amf", text.as_bytes(), &Profile::default()).report.attributes;

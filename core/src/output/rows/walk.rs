@@ -1,5 +1,6 @@
 //! The way through the faces of a file beside that through the fates of their triangles.
 
+use crate::geometry::position;
 use crate::io::read::polygon;
 use crate::io::record::{self, Point};
 use crate::io::rows::{CHANNELS, Corner, FaceRow, Faces, NONE, Rows, Source};
@@ -152,7 +153,7 @@ impl Walk<'_> {
         for (place, there) in places.into_iter().zip(came) {
             let corner = self.row.corners.get(place as usize)?;
             let own = self.rows.position(corner[0])?;
-            if own.map(f32::to_bits) != there.map(f32::to_bits) {
+            if position::bits(own) != position::bits(there) {
                 return None;
             }
         }

@@ -3,8 +3,9 @@
 use super::finding::Finding;
 use super::limits::HEADER_BYTES;
 use super::opened::Opened;
+use super::parsed::Parsed;
 use super::rounding::Rounding;
-use super::spool::{Context, Items, Parsed};
+use super::spool::{Context, Items};
 use super::vertices::{Positions, Vertices};
 use super::{amf, binary, obj, off, ply, sniff, tail, text, unpacked};
 use crate::contract::error::Result;

@@ -27,6 +27,7 @@ pub(super) mod off;
 mod opened;
 mod package;
 mod package_file;
+mod parsed;
 pub(super) mod ply;
 pub(crate) mod polygon;
 mod rounding;

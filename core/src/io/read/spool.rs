@@ -11,10 +11,8 @@ use std::path::Path;
 use memmap2::Mmap;
 use rayon::prelude::*;
 
-use super::finding::{Finding, Rejection};
-use super::limits::{HEADER_BYTES, MAX_TRIANGLES};
-use super::rounding::Rounding;
-use super::vertices::Positions;
+use super::finding::Rejection;
+use super::limits::MAX_TRIANGLES;
 use crate::contract::error::{Error, Result};
 use crate::contract::progress::Progress;
 use crate::contract::settings::Limits;
@@ -23,24 +21,6 @@ use crate::io::write_behind::{self, WriteBehind};
 
 /// Bytes of a position in a spool: x, y, z as little-endian `f32`.
 pub(super) const POSITION_BYTES: usize = 12;
-
-/// A file that was parsed.
-#[derive(Debug)]
-pub(crate) struct Parsed {
-    /// The records, in a file without a name.
-    pub(crate) records: Items<50>,
-    pub(crate) findings: Vec<Finding>,
-    /// The header of an output in binary STL.
-    pub(crate) header: [u8; HEADER_BYTES],
-    /// How far coordinates were moved to be `f32`, where the file holds finer ones.
-    pub(crate) rounding: Option<Rounding>,
-    /// The name of the unit of all coordinates, where the file says one.
-    pub(crate) unit: Option<&'static str>,
-    /// The positions that faces name by number, where the file has one table of them.
-    pub(crate) positions: Option<Positions>,
-    /// It has colours or materials in a form that no result keeps.
-    pub(crate) coloured: bool,
-}
 
 /// Paths, limits and progress of a reading.
 pub(crate) struct Context<'a> {

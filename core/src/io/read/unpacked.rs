@@ -2,7 +2,8 @@
 
 use super::archive::{Archive, shown};
 use super::finding::Rejection;
-use super::spool::{Context, Parsed};
+use super::parsed::Parsed;
+use super::spool::Context;
 use super::threemf::Model;
 use super::{amf, built, package_file};
 use crate::contract::error::Result;

@@ -6,7 +6,8 @@ use std::ops::Range;
 
 use super::super::binary;
 use super::super::limits::window;
-use super::super::spool::{Context, Items, POSITION_BYTES, Parsed, Spool};
+use super::super::parsed::Parsed;
+use super::super::spool::{Context, Items, POSITION_BYTES, Spool};
 use super::super::vertices::Vertices;
 use super::careful::{self, Piece};
 use super::model::{Content, Mesh, Model, Part, Place, Region};

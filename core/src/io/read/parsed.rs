@@ -1,0 +1,25 @@
+//! A file that was parsed.
+
+use super::finding::Finding;
+use super::limits::HEADER_BYTES;
+use super::rounding::Rounding;
+use super::spool::Items;
+use super::vertices::Positions;
+
+/// A file that was parsed.
+#[derive(Debug)]
+pub(crate) struct Parsed {
+    /// The records, in a file without a name.
+    pub(crate) records: Items<50>,
+    pub(crate) findings: Vec<Finding>,
+    /// The header of an output in binary STL.
+    pub(crate) header: [u8; HEADER_BYTES],
+    /// How far coordinates were moved to be `f32`, where the file holds finer ones.
+    pub(crate) rounding: Option<Rounding>,
+    /// The name of the unit of all coordinates, where the file says one.
+    pub(crate) unit: Option<&'static str>,
+    /// The positions that faces name by number, where the file has one table of them.
+    pub(crate) positions: Option<Positions>,
+    /// It has colours or materials in a form that no result keeps.
+    pub(crate) coloured: bool,
+}

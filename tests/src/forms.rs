@@ -188,37 +188,52 @@ fn joined(positions: &[[f32; 3]], faces: impl IntoIterator<Item = [usize; 3]>) -
     faces.into_iter().map(|face| face.map(|k| positions[k])).collect()
 }
 
-/// Binary, little-endian, of vertices that have nothing but three floats, and faces of three integers.
+/// In any form, of vertices of three floats and maybe a byte of colour, and faces of three integers.
 fn read_ply(bytes: &[u8]) -> Vec<Triangle> {
     let mark = b"end_header\n";
     let head = bytes.windows(mark.len()).position(|window| window == mark).expect("a header") + mark.len();
     let header = text(&bytes[..head]);
-    let body: Vec<&str> = header.lines().filter(|line| !line.starts_with("comment") && !line.starts_with("element")).collect();
-    let expected = "ply|format binary_little_endian 1.0|property float x|property float y|property float z|\
-        property list uchar int vertex_indices|end_header";
-    assert_eq!(body.join("|"), expected);
+    let is_said = |line: &&str| !["comment", "element", "format", "ply"].iter().any(|word| line.starts_with(word));
+    let body: Vec<&str> = header.lines().filter(is_said).filter(|line| *line != "property uchar red").collect();
+    assert_eq!(
+        body.join("|"),
+        "property float x|property float y|property float z|property list uchar int vertex_indices|end_header"
+    );
+    let is_coloured = header.contains("property uchar red");
     let count = |element: &str| -> usize {
         let line = header.lines().find_map(|line| line.strip_prefix(&format!("element {element} ")));
         line.expect("an element").parse().expect("a count")
     };
-    let (positions, faces) = bytes[head..].split_at(12 * count("vertex"));
-    let number = |bytes: &[u8]| f32::from_le_bytes(bytes.try_into().expect("four bytes"));
+    if header.contains("format ascii 1.0\n") {
+        let mut lines = text(&bytes[head..]).lines();
+        let positions: Vec<[f32; 3]> = lines.by_ref().take(count("vertex")).map(|line| first_three(numbers(line))).collect();
+        let faces: Vec<[usize; 3]> = lines.map(|line| three(numbers(line.strip_prefix("3 ").expect("a triangle")))).collect();
+        assert_eq!((positions.len(), faces.len()), (count("vertex"), count("face")));
+        return joined(&positions, faces);
+    }
+    let is_big = header.contains("format binary_big_endian 1.0\n");
+    assert!(is_big || header.contains("format binary_little_endian 1.0\n"), "{header}");
+    let word = |bytes: &[u8]| {
+        let bytes = bytes.try_into().expect("four bytes");
+        if is_big { u32::from_be_bytes(bytes) } else { u32::from_le_bytes(bytes) }
+    };
+    let row = 12 + usize::from(is_coloured);
+    let (positions, faces) = bytes[head..].split_at(row * count("vertex"));
     let positions: Vec<[f32; 3]> =
-        positions.chunks(12).map(|row| std::array::from_fn(|k| number(&row[4 * k..4 * k + 4]))).collect();
+        positions.chunks(row).map(|row| std::array::from_fn(|k| f32::from_bits(word(&row[4 * k..4 * k + 4])))).collect();
     assert_eq!(faces.len(), 13 * count("face"));
-    let index = |bytes: &[u8]| i32::from_le_bytes(bytes.try_into().expect("four bytes")) as usize;
     let faces = faces.chunks(13).map(|row| {
         assert_eq!(row[0], 3, "a triangle");
-        std::array::from_fn(|k| index(&row[1 + 4 * k..5 + 4 * k]))
+        std::array::from_fn(|k| word(&row[1 + 4 * k..5 + 4 * k]) as usize)
     });
     joined(&positions, faces)
 }
 
 fn read_off(text: &str) -> Vec<Triangle> {
     let mut lines = text.lines().filter(|line| !line.starts_with('#'));
-    assert_eq!(lines.next(), Some("OFF"));
+    assert!(lines.next().is_some_and(|line| line == "OFF" || line == "COFF"), "a keyword");
     let counts: Vec<usize> = numbers(lines.next().expect("counts"));
-    let positions: Vec<[f32; 3]> = lines.by_ref().take(counts[0]).map(|line| three(numbers(line))).collect();
+    let positions: Vec<[f32; 3]> = lines.by_ref().take(counts[0]).map(|line| first_three(numbers(line))).collect();
     let faces: Vec<[usize; 3]> = lines.map(|line| three(numbers(line.strip_prefix("3 ").expect("a triangle")))).collect();
     assert_eq!((positions.len(), faces.len()), (counts[0], counts[1]));
     joined(&positions, faces)
@@ -228,7 +243,7 @@ fn read_obj(text: &str) -> Vec<Triangle> {
     let (mut positions, mut faces) = (Vec::new(), Vec::new());
     for line in text.lines().filter(|line| !line.starts_with('#')) {
         match line.split_once(' ') {
-            Some(("v", rest)) => positions.push(three(numbers(rest))),
+            Some(("v", rest)) => positions.push(first_three(numbers(rest))),
             Some(("f", rest)) => faces.push(three(numbers::<usize>(rest)).map(|k: usize| k - 1)),
             _ => panic!("{line}"),
         }
@@ -277,4 +292,10 @@ fn numbers<T: std::str::FromStr>(line: &str) -> Vec<T> {
 
 fn three<T: Copy>(numbers: Vec<T>) -> [T; 3] {
     numbers.try_into().unwrap_or_else(|numbers: Vec<T>| panic!("{} numbers, not three", numbers.len()))
+}
+
+/// Those of a position, before its colour.
+fn first_three<T: Copy>(mut numbers: Vec<T>) -> [T; 3] {
+    numbers.truncate(3);
+    three(numbers)
 }

@@ -47,8 +47,8 @@ def repair_file(
     """Repairs a mesh file (STL, 3MF, PLY, OFF, OBJ, AMF) of any size into a new file, and returns the report.
 
     The output has the format that its name ends in (``.stl``, ``.3mf``, ``.ply``, ``.off``, ``.obj``, ``.amf``), or else that of the
-    input; ``profile={"format": "stl"}`` chooses in any case. A 3MF of another format is a package with one object. Of a repaired PLY, OFF, OBJ or AMF,
-    positions and triangles are written, nothing else.
+    input; ``profile={"format": "stl"}`` chooses in any case. A 3MF of another format is a package with one object. A repaired PLY, OFF or OBJ
+    keeps its colours, normals, texture coordinates and materials where the output is of its format; ``report["attributes"]`` counts.
 
     The output appears under its name when it is complete and on the disk, whatever the outcome: look at ``report["outcome"]``. It has the same
     bytes whatever ``memory`` and ``threads`` are. The input is never written to. If there is a file of that name already, it is replaced only

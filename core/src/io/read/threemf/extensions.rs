@@ -1,6 +1,7 @@
 //! Namespaces of 3MF, and which of them are understood.
 
 use super::super::archive::shown;
+use super::super::finding::legible;
 use super::super::xml::Element;
 
 const CORE: &str = "http://schemas.microsoft.com/3dmanufacturing/core/2015/02";
@@ -57,7 +58,7 @@ pub(super) fn is_understood(namespace: &str) -> bool {
 /// An extension for people.
 pub(super) fn words(namespace: &str) -> String {
     let known = KNOWN.iter().find(|(part, _)| namespace.contains(part));
-    known.map_or_else(|| shown(namespace), |(_, name)| format!("{name} ({namespace})"))
+    known.map_or_else(|| shown(namespace), |(_, name)| format!("{name} ({})", legible(namespace)))
 }
 
 /// What an object is made of, by the first element in it that is neither a mesh nor components.
@@ -69,4 +70,17 @@ pub(super) fn content(name: &str) -> Option<&'static str> {
         "beamlattice" => "a beam lattice",
         _ => return None,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A fuzzer's find: the name of a known extension with more around it.
+    #[test]
+    fn words_have_no_control_characters() {
+        for namespace in ["http://schemas.micr\u{1f}soft.com/3dmanufacturing/displacement/2022/07", "\u{7}\n"] {
+            assert!(!words(namespace).contains(char::is_control), "{:?}", words(namespace));
+        }
+    }
 }

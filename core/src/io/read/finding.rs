@@ -30,7 +30,7 @@ pub enum Loss {
 
 impl Finding {
     pub(super) fn flaw(text: impl Into<String>) -> Self {
-        Self { text: text.into(), harmless: false, loss: Loss::None }
+        Self { text: escaped(&text.into(), LONGEST_LINE), harmless: false, loss: Loss::None }
     }
 
     pub(super) fn loss(text: impl Into<String>) -> Self {
@@ -38,18 +38,23 @@ impl Finding {
     }
 }
 
-/// Characters of a file's own words that are shown, at most.
+/// Characters of a file's own words that are shown, at most, and those of a line that has any.
 const SHOWN: usize = 80;
+const LONGEST_LINE: usize = 1000;
 
 /// A file's own words for people: control characters escaped, and cut to 80 characters.
 pub(super) fn legible(words: &str) -> String {
+    escaped(words, SHOWN)
+}
+
+/// Up to so many characters, of which those are escaped that control something, turn the direction of text, or are not seen at all.
+fn escaped(words: &str, most: usize) -> String {
     let mut text = String::new();
     for (count, character) in words.chars().enumerate() {
-        if count == SHOWN {
+        if count == most {
             text.push('…');
             break;
         }
-        // Besides control characters those that turn the direction of text, or are not seen at all.
         match character {
             '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2060}'..='\u{2069}' | '\u{feff}' => {
                 text.extend(character.escape_unicode());
@@ -81,7 +86,8 @@ pub(crate) enum Rejection {
 impl Rejection {
     pub(crate) fn at(self, path: &Path) -> Error {
         match self {
-            Self::Unreadable(reason) => Error::Unreadable { path: path.to_owned(), reason },
+            // Whatever of the file's words is in it.
+            Self::Unreadable(reason) => Error::Unreadable { path: path.to_owned(), reason: escaped(&reason, LONGEST_LINE) },
             Self::TooMany => Error::Refused {
                 path: path.to_owned(),
                 reason: format!("more than {} triangles", Count(MAX_TRIANGLES)),
@@ -93,5 +99,22 @@ impl Rejection {
                 advice: "let it place fewer copies".into(),
             },
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn f13_whatever_a_file_says_is_shown_in_one_line() {
+        let hostile = "a\u{1b}[2J\nb\u{202e}c".to_owned() + &"x".repeat(1 << 20);
+        let finding = Finding::flaw(hostile.clone());
+        let refused = Rejection::Unreadable(hostile.clone()).at(Path::new("a.3mf")).to_string();
+        for line in [finding.text, refused, legible(&hostile), legible_bytes(hostile.as_bytes())] {
+            assert!(line.contains("a\\u{1b}[2J\\nb\\u{202e}cx") && line.ends_with('…'), "{line}");
+            assert!(line.len() < 1100 && !line.chars().any(char::is_control));
+        }
+        assert_eq!(Finding::flaw("1\u{2009}000 “öd”").text, "1\u{2009}000 “öd”");
     }
 }

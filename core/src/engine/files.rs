@@ -39,6 +39,9 @@ use crate::util::parallel;
 /// Fewer bytes are hashed by one thread: starting more would take longer.
 pub(crate) const HASHED_BY_ONE: usize = 1 << 20;
 
+/// Bytes that are hashed before their pages may go.
+const HASHED_AT_ONCE: usize = 32 << 20;
+
 /// Diagnoses a mesh.
 pub(crate) fn look(
     mesh: &MeshFile,
@@ -370,23 +373,28 @@ pub(crate) fn facts(mesh: &MeshFile, blake3: String) -> FileFacts {
 
 pub(crate) fn hash(mesh: &MeshFile, limits: &Limits, progress: &dyn Progress) -> String {
     progress.at("hash", 0, mesh.records().len() as u64);
-    hash_of(mesh.bytes(), limits)
+    hash_blocks(mesh.bytes(), limits, || mesh.let_input_go())
 }
 
 /// BLAKE3, hexadecimal.
 pub(crate) fn hash_of(bytes: &[u8], limits: &Limits) -> String {
-    if limits.threads < 2 || bytes.len() < HASHED_BY_ONE {
-        return hash_blocks(bytes, limits, Hasher::update);
-    }
-    parallel::in_pool(limits.threads, || hash_blocks(bytes, limits, Hasher::update_rayon))
+    hash_blocks(bytes, limits, || ())
 }
 
-fn hash_blocks(bytes: &[u8], limits: &Limits, update: for<'h> fn(&'h mut Hasher, &[u8]) -> &'h mut Hasher) -> String {
-    let mut hasher = Hasher::new();
-    for block in Guide::new(bytes, limits).blocks(bytes) {
-        update(&mut hasher, block);
+/// `passed` is called behind each part.
+fn hash_blocks(bytes: &[u8], limits: &Limits, passed: impl Fn() + Sync) -> String {
+    let hash = |update: for<'h> fn(&'h mut Hasher, &[u8]) -> &'h mut Hasher| {
+        let mut hasher = Hasher::new();
+        for part in Guide::new(bytes, limits).blocks(bytes).flat_map(|block| block.chunks(HASHED_AT_ONCE)) {
+            update(&mut hasher, part);
+            passed();
+        }
+        hasher.finalize().to_hex().to_string()
+    };
+    if limits.threads < 2 || bytes.len() < HASHED_BY_ONE {
+        return hash(Hasher::update);
     }
-    hasher.finalize().to_hex().to_string()
+    parallel::in_pool(limits.threads, || hash(Hasher::update_rayon))
 }
 
 #[cfg(test)]

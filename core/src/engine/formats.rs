@@ -30,6 +30,9 @@ use crate::output::rows::Planned;
 use crate::util::parallel;
 use crate::util::words::triangles;
 
+/// Triangles that are compared before their pages may go.
+const COMPARED: usize = 1 << 18;
+
 /// The format of an output.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Target {
@@ -277,14 +280,23 @@ fn encode(made: &MeshFile, output: &Path, layout: Layout, limits: &Limits, progr
     let name = concat!("Suture ", env!("CARGO_PKG_VERSION"));
     encode::write((&indexed, made.records().len()), (layout, name), output, limits, progress)?;
     drop(indexed);
+    made.let_go();
     files::open(output, limits, progress)
 }
 
 /// Does the written file hold the triangles that were made?
 fn confirm(made: &MeshFile, written: &MeshFile, limits: &Limits) -> Result<()> {
     let same = |(a, b): (&Record, &Record)| position::corners(a).map(position::bits) == position::corners(b).map(position::bits);
-    let (made, records) = (made.records(), written.records());
-    let holds = parallel::in_pool(limits.threads, || made.len() == records.len() && made.par_iter().zip(records).all(same));
+    let (files, made, records) = ([made, written], made.records(), written.records());
+    let is_same = |(made, records): (&[Record], &[Record])| {
+        let is_same = made.par_iter().zip(records).all(same);
+        // Pages of two whole meshes would be resident.
+        files.iter().for_each(|file| file.let_go());
+        is_same
+    };
+    let holds = parallel::in_pool(limits.threads, || {
+        made.len() == records.len() && made.chunks(COMPARED).zip(records.chunks(COMPARED)).all(is_same)
+    });
     if !holds || !written.is_flawless() {
         let source = std::io::Error::other("the file does not hold what was written to it");
         return Err(Error::io(written.path(), "reading back")(source));

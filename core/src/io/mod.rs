@@ -8,6 +8,7 @@
 
 pub(crate) mod digest;
 pub(crate) mod disk_space;
+pub(crate) mod file_map;
 pub mod read;
 pub(crate) mod read_ahead;
 pub mod record;

@@ -3,6 +3,7 @@
 use crate::contract::report::{EditRecords, EditSummary, FaceOrigin, RepairName};
 use crate::geometry::distance::distance;
 use crate::io::record::{self, Record};
+use crate::output::attribute_words;
 use crate::submesh::components::Reversed;
 use crate::submesh::{Origin, Submesh};
 use crate::topology::survey::Survey;
@@ -43,6 +44,7 @@ impl Edit {
     /// over the records of reversed regions.
     pub(crate) fn of(survey: &Survey<'_>, submesh: &Submesh, reversed: &Reversed, wrapped: &[[[f32; 3]; 3]]) -> Self {
         let mut edit = Self::default();
+        let words = attribute_words::of_new(survey, submesh);
         edit.changes.reserve_exact(survey.nonfinite.iter().map(|r| r.1 as usize).sum());
         edit.changes
             .extend(survey.nonfinite.iter().flat_map(|(first, count)| *first..*first + *count).map(|t| (t, Change::Delete)));
@@ -55,7 +57,9 @@ impl Edit {
                 Origin::Part(t) if triangle.alive => {
                     edit.add(points(), record::attribute(&survey.records[t as usize]), FaceOrigin::Part(t));
                 }
-                Origin::Added(repair) if triangle.alive => edit.add(points(), 0, FaceOrigin::Repair(repair)),
+                Origin::Added(repair) if triangle.alive => {
+                    edit.add(points(), words.get(&i).copied().unwrap_or_default(), FaceOrigin::Repair(repair));
+                }
                 Origin::Part(_) | Origin::Added(_) => {}
             }
         }

@@ -7,6 +7,7 @@
 //! read back, not of what should have been written.
 
 pub(crate) mod archive;
+mod attribute_words;
 pub(crate) mod edit;
 pub(crate) mod emit;
 pub(crate) mod encode;

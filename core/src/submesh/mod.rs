@@ -45,7 +45,7 @@ pub(crate) enum Origin {
     Input(u32),
     /// A part of this record; takes its attribute.
     Part(u32),
-    /// Made by this repair, as a part of no record; its attribute is 0.
+    /// Made by this repair, as a part of no record; its attribute is that of most of its rim.
     Added(RepairName),
 }
 

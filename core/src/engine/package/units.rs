@@ -9,7 +9,6 @@ use crate::contract::settings::Limits;
 use crate::engine::files;
 use crate::engine::work::Work;
 use crate::io::read::{MeshFile, MeshRecords, PREFIX_BYTES, PackageFile, Place};
-use crate::io::record::Record;
 use crate::io::write_behind::{self, Nameless};
 
 /// Triangles of an object that are one mesh.
@@ -61,17 +60,22 @@ pub(super) fn of(package: &PackageFile, place: Place, read: &MeshRecords) -> Res
 /// # Errors
 /// [`Error::NoSpace`], [`Error::Io`].
 pub(super) fn spooled(package: &PackageFile, unit: &UnitOf, read: &MeshRecords, work: Work<'_>) -> Result<(MeshFile, Nameless)> {
-    let records = read.parsed.records.all().get(unit.triangles.clone()).unwrap_or_default();
-    let file = stl(package.path(), &read.parsed.header, records, work.limits)?;
+    let file = stl(package.path(), read, unit.triangles.clone(), work.limits)?;
     let spool = Nameless::of(file);
     Ok((files::open(&spool.path(), work.limits, work.progress)?.called(package.path()), spool))
 }
 
-fn stl(path: &Path, header: &[u8], records: &[Record], limits: &Limits) -> Result<File> {
+fn stl(path: &Path, read: &MeshRecords, triangles: Range<usize>, limits: &Limits) -> Result<File> {
+    let all = &read.parsed.records;
+    let records = all.all().get(triangles).unwrap_or_default();
     let bytes = (PREFIX_BYTES + size_of_val(records)) as u64;
     write_behind::spooled(path, limits, (bytes, "the triangles of an object"), |append| {
-        append(header)?;
+        append(&read.parsed.header)?;
         append(&(records.len() as u32).to_le_bytes())?;
-        records.chunks(1 << 14).try_for_each(|chunk| append(chunk.as_flattened()))
+        records.chunks(1 << 14).try_for_each(|chunk| {
+            append(chunk.as_flattened())?;
+            all.let_go();
+            Ok(())
+        })
     })
 }

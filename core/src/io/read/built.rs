@@ -12,7 +12,7 @@ use super::finding::{Finding, Loss, Rejection};
 use super::limits::most_copies;
 use super::parsed::Parsed;
 use super::rounding::Rounding;
-use super::spool::{Context, Spool};
+use super::spool::{Context, Items, Spool};
 use super::threemf::{MeshRecords, Model, Object, Place, Transform};
 use crate::contract::error::Result;
 use crate::io::record::{self, Record};
@@ -52,8 +52,11 @@ pub(super) fn mesh(model: &Model, wanted: fn(&Object) -> bool, bytes: usize, con
 
     let mut placing = Placing { context, spool: context.records()?, rounding: Rounding::default() };
     each(model, wanted, |place, transform| match where_kept.get(&place) {
-        Some(range) => placing.add(part(kept.all(), range), transform),
-        None => placing.add(reading.read(place)?.parsed.records.all(), transform),
+        Some(range) => placing.add(&kept, range.clone(), transform),
+        None => {
+            let records = reading.read(place)?.parsed.records;
+            placing.add(&records, 0..records.all().len(), transform)
+        }
     })?;
     let Placing { spool, rounding, .. } = placing;
     if spool.count() == 0 {
@@ -81,10 +84,6 @@ fn each(model: &Model, wanted: fn(&Object) -> bool, mut place: impl FnMut(Place,
         });
     }
     done
-}
-
-fn part<'r>(records: &'r [Record], range: &Range<usize>) -> &'r [Record] {
-    records.get(range.clone()).unwrap_or_default()
 }
 
 /// Objects that are read, and what is odd about them.
@@ -136,10 +135,12 @@ struct Placing<'a> {
 }
 
 impl Placing<'_> {
-    fn add(&mut self, records: &[Record], transform: &Transform) -> Result<()> {
+    fn add(&mut self, of: &Items<50>, range: Range<usize>, transform: &Transform) -> Result<()> {
+        let records = of.all().get(range).unwrap_or_default();
         for chunk in records.chunks(PLACED) {
             let placed: Vec<Record> = chunk.iter().map(|record| placed(record, transform, &mut self.rounding)).collect();
             self.spool.append(&placed)?;
+            of.let_go();
         }
         self.context.at(self.spool.count(), self.spool.count())
     }

@@ -5,8 +5,7 @@
 
 use std::path::Path;
 
-use memmap2::Mmap;
-
+use super::access::Bytes;
 use super::finding::Finding;
 use super::mesh_file::Content;
 use super::package_file::PackageFile;
@@ -38,7 +37,7 @@ pub enum Reader {
 
 /// All that a reader makes of bytes.
 pub struct Made {
-    input: Mmap,
+    input: Bytes,
     content: Content,
 }
 
@@ -70,7 +69,7 @@ pub fn read(reader: Reader, bytes: &[u8], spool: &Path, limits: &Limits) -> Resu
         Reader::Amf => sniff::Kind::Amf,
         Reader::Archive => sniff::Kind::Archive,
     };
-    let content = Content::of(kind, &input, &Context { path, spool, limits, progress: &Quiet })?;
+    let content = Content::of(kind, &input, &Context { path, spool, limits, progress: &Quiet, passed: None })?;
     Ok(Made { input, content })
 }
 
@@ -93,8 +92,8 @@ pub fn read_objects(path: &Path, limits: &Limits) -> Result<usize> {
 }
 
 /// `bytes` as a map, which cannot be empty.
-fn mapped(bytes: &[u8]) -> Mmap {
+fn mapped(bytes: &[u8]) -> Bytes {
     let mut map = memmap2::MmapMut::map_anon(bytes.len().max(1)).expect("a map");
     map.get_mut(..bytes.len()).into_iter().for_each(|map| map.copy_from_slice(bytes));
-    map.make_read_only().expect("a map")
+    Bytes::Copied(map.make_read_only().expect("a map"))
 }

@@ -1,5 +1,6 @@
 //! An open mesh file and its records.
 
+use super::access::Bytes;
 use super::finding::Finding;
 use super::limits::HEADER_BYTES;
 use super::opened::Opened;
@@ -35,9 +36,7 @@ pub struct MeshFile {
     opened: Opened,
     /// As errors and reports name it.
     name: PathBuf,
-    /// Holds what `input` does, at the same places; `None` for a copy in memory.
-    file: Option<File>,
-    input: Mmap,
+    input: Bytes,
     source: Source,
     format: Format,
     findings: Vec<Finding>,
@@ -63,7 +62,9 @@ impl Content {
     ///
     /// # Errors
     /// Those of [`MeshFile::open`], but for those of opening.
-    pub(super) fn of(kind: sniff::Kind, input: &Mmap, context: &Context<'_>) -> Result<Self> {
+    pub(super) fn of(kind: sniff::Kind, input: &Bytes, context: &Context<'_>) -> Result<Self> {
+        // Its text is passed once or twice, from the beginning to the end.
+        let passing = context.passing(input.map());
         match kind {
             sniff::Kind::Binary(sniff::Layout { triangles, mut findings }) => {
                 findings.extend(tail::of_records(binary::records(input, triangles)));
@@ -82,20 +83,20 @@ impl Content {
                 // Advice; without it reading ahead is only less bold.
                 let _ = input.advise(memmap2::Advice::Sequential);
                 let (content, zeros) = tail::split(input);
-                let parsed = parallel::in_pool(context.limits.threads, || text::read(content, start, context))?;
+                let parsed = parallel::in_pool(context.limits.threads, || text::read(content, start, &passing))?;
                 findings.extend(tail::of_text(content, zeros));
                 Ok(Self::parsed(parsed, Format::AsciiStl, findings))
             }
             sniff::Kind::Amf => {
                 let _ = input.advise(memmap2::Advice::Sequential);
                 let (content, zeros) = tail::split(input);
-                let parsed = parallel::in_pool(context.limits.threads, || amf::read(content, input.len(), context))?;
+                let parsed = parallel::in_pool(context.limits.threads, || amf::read(content, input.len(), &passing))?;
                 Ok(Self::parsed(parsed, Format::Amf, tail::of_text(content, zeros).into_iter().collect()))
             }
             sniff::Kind::Obj(start) => {
                 let _ = input.advise(memmap2::Advice::Sequential);
                 let (content, zeros) = tail::split(input);
-                let parsed = parallel::in_pool(context.limits.threads, || obj::read(content, start, context))?;
+                let parsed = parallel::in_pool(context.limits.threads, || obj::read(content, start, &passing))?;
                 Ok(Self::parsed(parsed, Format::Obj, tail::of_lines(content, zeros).into_iter().collect()))
             }
             sniff::Kind::Archive => {
@@ -141,11 +142,11 @@ impl MeshFile {
     /// [`crate::Error::Io`] where opening, mapping or spooling fails, or with [`std::io::ErrorKind::Interrupted`] when `progress`
     /// cancels.
     pub fn open(path: &Path, spool: &Path, limits: &Limits, progress: &dyn Progress) -> Result<Self> {
-        let (opened, input, file) = Opened::bytes(path, spool, limits, progress)?;
+        let (opened, input) = Opened::bytes(path, spool, limits, progress)?;
         let kind = sniff::sniff(&input).map_err(|rejection| rejection.at(path))?;
-        let content = Content::of(kind, &input, &Context { path, spool, limits, progress })?;
+        let content = Content::of(kind, &input, &Context { path, spool, limits, progress, passed: None })?;
         let Content { source, format, findings, header, unit, positions, coloured } = content;
-        Ok(Self { opened, name: path.to_owned(), file, input, source, format, findings, header, unit, positions, coloured })
+        Ok(Self { opened, name: path.to_owned(), input, source, format, findings, header, unit, positions, coloured })
     }
 
     /// The triangles in input order, those with NaN or infinite coordinates included.
@@ -209,6 +210,25 @@ impl MeshFile {
         &self.input
     }
 
+    /// Gives the pages of the input back until they are read again, where the records are elsewhere.
+    pub(crate) fn let_input_go(&self) {
+        if !self.is_in_place()
+            && let Some(map) = self.input.map()
+        {
+            map.let_go();
+        }
+    }
+
+    /// Gives all pages of the input and of the records back until they are read again.
+    pub(crate) fn let_go(&self) {
+        if let Some(map) = self.input.map() {
+            map.let_go();
+        }
+        if let Source::Spooled(records) = &self.source {
+            records.let_go();
+        }
+    }
+
     /// The positions that its faces name by number, where it has one table of them.
     pub(crate) fn vertices(&self) -> Option<Vertices<'_>> {
         Some(self.positions.as_ref()?.vertices(&self.input))
@@ -223,7 +243,7 @@ impl MeshFile {
     /// never leave the kernel.
     pub(crate) fn locate(&self, part: &[u8]) -> Option<(&File, u64)> {
         let offset = (part.as_ptr() as usize).checked_sub(self.input.as_ptr() as usize)?;
-        let file = self.file.as_ref()?;
+        let file = self.input.file()?;
         (offset + part.len() <= self.input.len()).then_some((file, offset as u64))
     }
 

@@ -4,9 +4,7 @@ use std::fs::{File, Metadata, OpenOptions};
 use std::os::unix::fs::{MetadataExt, OpenOptionsExt};
 use std::path::{Path, PathBuf};
 
-use memmap2::Mmap;
-
-use super::access;
+use super::access::{Bytes, Foreign};
 use super::finding::Rejection;
 use crate::contract::error::{Error, Result};
 use crate::contract::progress::Progress;
@@ -42,24 +40,19 @@ pub(super) struct Opened {
 }
 
 impl Opened {
-    /// Opens a file: its bytes, and the file that holds them at the same places, if there is one.
+    /// Opens a file: its bytes.
     ///
     /// # Errors
     /// [`Error::Unreadable`] for an empty file and for what is no file, [`Error::Changed`], [`Error::NoSpace`], [`Error::Io`].
-    pub(super) fn bytes(
-        path: &Path,
-        spool: &Path,
-        limits: &Limits,
-        progress: &dyn Progress,
-    ) -> Result<(Self, Mmap, Option<File>)> {
+    pub(super) fn bytes(path: &Path, spool: &Path, limits: &Limits, progress: &dyn Progress) -> Result<(Self, Bytes)> {
         let (file, identity) = open_regular(path)?;
         if identity.size == 0 {
             return Err(Rejection::Unreadable("empty file".into()).at(path));
         }
         // As long as the identity says, whatever happened in between.
         let length = usize::try_from(identity.size).map_err(|_| Rejection::TooMany.at(path))?;
-        let (input, file) = access::Foreign { path, file, length, spool, limits, progress }.bytes()?;
-        Ok((Self { path: path.to_owned(), identity }, input, file))
+        let input = Foreign { path, file, length, spool, limits, progress }.bytes()?;
+        Ok((Self { path: path.to_owned(), identity }, input))
     }
 
     /// Its length in bytes.

@@ -3,8 +3,7 @@
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-use memmap2::Mmap;
-
+use super::access::Bytes;
 use super::archive::Archive;
 use super::finding::{Finding, Rejection};
 use super::opened::Opened;
@@ -24,7 +23,7 @@ pub(super) const CONTENT_TYPES: &str = "[Content_Types].xml";
 pub(crate) struct PackageFile {
     opened: Opened,
     path: PathBuf,
-    input: Mmap,
+    input: Bytes,
     model: Model,
     /// The part of a slicer's project that says which triangles are volumes: the number of its entry, and its text.
     config: Option<(usize, Vec<u8>)>,
@@ -51,8 +50,8 @@ impl PackageFile {
             return Ok(None);
         }
         let spool = limits.spool_folder();
-        let (opened, input, _) = Opened::bytes(path, &spool, limits, progress)?;
-        let context = Context { path, spool: &spool, limits, progress };
+        let (opened, input) = Opened::bytes(path, &spool, limits, progress)?;
+        let context = Context { path, spool: &spool, limits, progress, passed: None };
         let reject = |rejection: Rejection| rejection.at(path);
         let archive = Archive::open(&input).map_err(reject)?;
         if archive.find(CONTENT_TYPES).is_none() {
@@ -80,7 +79,7 @@ impl PackageFile {
     /// As [`PackageFile::open`].
     pub(crate) fn read(&self, place: Place, limits: &Limits, progress: &dyn Progress) -> Result<MeshRecords> {
         let spool = limits.spool_folder();
-        let context = Context { path: &self.path, spool: &spool, limits, progress };
+        let context = Context { path: &self.path, spool: &spool, limits, progress, passed: None };
         parallel::in_pool(limits.threads, || self.model.records(place, &context))
     }
 

@@ -8,7 +8,6 @@ use std::fs::File;
 use std::io::{Seek, SeekFrom};
 use std::path::Path;
 
-use memmap2::Mmap;
 use rayon::prelude::*;
 
 use super::finding::Rejection;
@@ -17,21 +16,30 @@ use crate::contract::error::{Error, Result};
 use crate::contract::progress::Progress;
 use crate::contract::settings::Limits;
 use crate::io::disk_space::{self, Need};
+use crate::io::file_map::FileMap;
 use crate::io::write_behind::{self, WriteBehind};
 
 /// Bytes of a position in a spool: x, y, z as little-endian `f32`.
 pub(super) const POSITION_BYTES: usize = 12;
 
 /// Paths, limits and progress of a reading.
+#[derive(Clone, Copy)]
 pub(crate) struct Context<'a> {
     pub(super) path: &'a Path,
     /// The folder for spools.
     pub(super) spool: &'a Path,
     pub(super) limits: &'a Limits,
     pub(super) progress: &'a dyn Progress,
+    /// The map that is read from its beginning to its end, if it is of a file: what lies behind the reader is let go.
+    pub(super) passed: Option<&'a FileMap>,
 }
 
 impl<'a> Context<'a> {
+    /// For reading this map from its beginning to its end.
+    pub(super) fn passing(self, map: Option<&'a FileMap>) -> Self {
+        Self { passed: map, ..self }
+    }
+
     /// Refuses the file when there is no room for so many bytes in the folder for spools.
     pub(super) fn make_room(&self, bytes: u64, what: &'static str) -> Result<()> {
         disk_space::check(self.path, &[Need { folder: self.spool.into(), bytes, what }])
@@ -82,6 +90,9 @@ impl<'a> Context<'a> {
                 return Ok(());
             }
             parsed = now;
+            if let Some(map) = self.passed {
+                map.let_go();
+            }
             self.at(done, total)?;
         }
     }
@@ -142,19 +153,33 @@ impl<const N: usize> Spool<'_, N> {
         if self.count == 0 {
             return Ok(Items(None));
         }
+        let length = usize::try_from(self.count).ok().and_then(|count| count.checked_mul(N));
+        let length = length.ok_or_else(|| Rejection::TooMany.at(self.path))?;
         // SAFETY: the file has no name and this was its only handle that writes: nobody changes or truncates it.
-        let map = unsafe { Mmap::map(&self.file) }.map_err(Error::io(self.folder, "mapping"))?;
+        let map = unsafe { FileMap::of(&self.file, length) }.map_err(Error::io(self.folder, "mapping"))?;
         Ok(Items(Some(map)))
     }
 }
 
 /// Items of `N` bytes in a file without a name.
 #[derive(Debug, Default)]
-pub(crate) struct Items<const N: usize>(Option<Mmap>);
+pub(crate) struct Items<const N: usize>(Option<FileMap>);
 
 impl<const N: usize> Items<N> {
     /// All of them, in the order in which they were appended.
     pub(crate) fn all(&self) -> &[[u8; N]] {
         self.0.as_ref().map_or(&[], |map| map.as_chunks().0)
+    }
+
+    /// The file that holds them, mapped.
+    pub(super) fn map(&self) -> Option<&FileMap> {
+        self.0.as_ref()
+    }
+
+    /// Gives their pages back until they are read again.
+    pub(crate) fn let_go(&self) {
+        if let Some(map) = &self.0 {
+            map.let_go();
+        }
     }
 }

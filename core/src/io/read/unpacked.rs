@@ -24,7 +24,7 @@ pub(super) fn read(bytes: &[u8], context: &Context<'_>) -> Result<(Parsed, Forma
     match files.as_slice() {
         [entry] if is_amf(&entry.name) => {
             let text = archive.spooled(entry, context)?;
-            Ok((amf::read(text.all().as_flattened(), bytes.len(), context)?, Format::Amf))
+            Ok((amf::read(text.all().as_flattened(), bytes.len(), &context.passing(text.map()))?, Format::Amf))
         }
         [] => Err(Rejection::Unreadable("an archive without a file in it".into()).at(context.path)),
         [first, ..] => {

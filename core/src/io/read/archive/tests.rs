@@ -19,7 +19,7 @@ fn contents(bytes: &[u8]) -> Result<Vec<(String, Vec<u8>)>> {
 fn contents_with(bytes: &[u8], progress: &dyn Progress) -> Result<Vec<(String, Vec<u8>)>> {
     let limits = Limits::default();
     let folder = std::env::temp_dir();
-    let context = Context { path: Path::new("part.3mf"), spool: &folder, limits: &limits, progress };
+    let context = Context { path: Path::new("part.3mf"), spool: &folder, limits: &limits, progress, passed: None };
     let archive = Archive::open(bytes).map_err(|rejection| rejection.at(context.path))?;
     let read = |entry: &Entry| {
         let spooled = archive.spooled(entry, &context)?.all().as_flattened().to_vec();

@@ -29,7 +29,7 @@ fn package(root: &[(&str, &str, &str)], others: &[Member]) -> Vec<u8> {
 /// What `look` sees of a package.
 fn opened<R>(bytes: &[u8], look: impl FnOnce(&mut Opc<'_>, &Context<'_>) -> Result<R>) -> Result<R> {
     let (limits, folder) = (Limits::default(), std::env::temp_dir());
-    let context = Context { path: Path::new("a.3mf"), spool: &folder, limits: &limits, progress: &Quiet };
+    let context = Context { path: Path::new("a.3mf"), spool: &folder, limits: &limits, progress: &Quiet, passed: None };
     let archive = Archive::open(bytes).map_err(|rejection| rejection.at(context.path))?;
     look(&mut Opc::open(archive, &context)?, &context)
 }

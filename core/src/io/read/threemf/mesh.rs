@@ -179,5 +179,5 @@ fn in_windows<R: Send>(
         }
         Ok((batch, (at - start) as u64))
     };
-    context.in_order((end - start) as u64, next, parse, take)
+    context.passing(part.text.map()).in_order((end - start) as u64, next, parse, take)
 }

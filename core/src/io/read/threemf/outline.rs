@@ -58,6 +58,7 @@ pub(super) fn read(name: &str, text: Items<1>, budget: &mut Budget) -> Result<Pa
     }
     drop(xml);
     part.text = text;
+    part.text.let_go();
     Ok(part)
 }
 

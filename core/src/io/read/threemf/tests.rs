@@ -16,7 +16,7 @@ use crate::io::record::{Point, corners};
 /// What `look` sees of a package.
 fn seen<R>(bytes: &[u8], look: impl FnOnce(&Model, &Context<'_>) -> Result<R>) -> Result<R> {
     let (limits, folder) = (Limits::default(), std::env::temp_dir());
-    let context = Context { path: Path::new("a.3mf"), spool: &folder, limits: &limits, progress: &Quiet };
+    let context = Context { path: Path::new("a.3mf"), spool: &folder, limits: &limits, progress: &Quiet, passed: None };
     look(&Model::open(bytes, &context)?, &context)
 }
 

@@ -4,4 +4,4 @@
 use libfuzzer_sys::fuzz_target;
 use suture_fuzz::Reader;
 
-fuzz_target!(|bytes: &[u8]| suture_fuzz::check(Reader::Ply, bytes));
+fuzz_target!(|bytes: &[u8]| suture_fuzz::check_rows(Reader::Ply, bytes));

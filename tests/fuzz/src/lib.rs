@@ -33,6 +33,7 @@ use crate::contract::progress::Progress;
 use crate::contract::settings::{Limits, Profile};
 use crate::io::read::Finding;
 use crate::io::read::fuzzing::{self, Made};
+use crate::io::rows::fuzzing as rows;
 
 #[global_allocator]
 static COUNTED: memory::Counted = memory::Counted;
@@ -87,6 +88,19 @@ pub fn check_package(bytes: &[u8]) {
     if let Err(error) = within_bounds(bytes.len(), || fuzzing::read_objects(file.path(), &limits)) {
         refused(&error);
     }
+}
+
+/// Asks the rows of a file all that a writer would ask, once it is read.
+pub fn check_rows(reader: Reader, bytes: &[u8]) {
+    check(reader, bytes);
+    if bytes.is_empty() {
+        return;
+    }
+    let mut file = tempfile::NamedTempFile::new_in(SPOOLS).expect("a file");
+    file.write_all(bytes).expect("it is written");
+    let limits = Limits { spool: Some(SPOOLS.into()), ..limits(1) };
+    // Bytes that another reader takes are that one's.
+    let _ = within_bounds(bytes.len(), || rows::ask(file.path(), &limits));
 }
 
 /// A packed AMF around `text`, as it is.

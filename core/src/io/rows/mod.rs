@@ -8,6 +8,8 @@
 //! coordinates stand behind a position.
 
 mod cells;
+#[cfg(fuzzing)]
+pub mod fuzzing;
 mod obj;
 mod off;
 mod ply;

@@ -34,7 +34,10 @@ fn faces(rows: &dyn Rows) -> usize {
     let (mut row, mut written, mut before) = (FaceRow::default(), Vec::new(), State::default());
     let mut all = rows.faces();
     while all.next_face(&mut row).is_some() {
-        assert!(at <= row.whole.start && row.whole.start < row.whole.end && row.whole.end <= length, "a face stands behind the one before");
+        assert!(
+            at <= row.whole.start && row.whole.start < row.whole.end && row.whole.end <= length,
+            "a face stands behind the one before"
+        );
         at = row.whole.end;
         rows.says(&row);
         for corner in &row.corners {

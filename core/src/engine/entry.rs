@@ -8,6 +8,7 @@ use crate::contract::report::Report;
 use crate::contract::settings::{Limits, Profile};
 use crate::engine::clock::Clock;
 use crate::engine::package;
+use crate::engine::parts;
 use crate::engine::work::Work;
 use crate::engine::{files, formats, judging};
 use crate::io::read::PackageFile;
@@ -27,7 +28,11 @@ pub(crate) fn inspect(input: &Path, profile: &Profile, limits: &Limits, progress
     }
     let mesh = files::open(input, limits, progress)?;
     clock.stage("read");
-    let report = files::look(&mesh, (profile, limits), progress, &mut clock)?;
+    let report = if mesh.parts().is_empty() {
+        files::look(&mesh, (profile, limits), progress, &mut clock)?
+    } else {
+        parts::inspect(&mesh, Work { profile, limits, progress }, &mut clock)?
+    };
     clock.close(report, mesh.path(), mesh.records().len())
 }
 
@@ -48,6 +53,10 @@ pub(crate) fn repair(input: &Path, output: &Path, profile: &Profile, limits: &Li
     let triangles = mesh.records().len();
     let target = formats::target(mesh.format(), mesh.unit(), profile.format);
     let report = match target.layout {
+        _ if !mesh.parts().is_empty() => {
+            clock.stage("read");
+            parts::repair((&mesh, input), output, target, Work { profile, limits, progress }, &mut clock)?
+        }
         None => formats::into_stl(mesh, output, target, Work { profile, limits, progress }, &mut clock)?,
         Some(layout) => {
             let make = |mesh, spool: &Path, clock: &mut Clock| {

@@ -10,20 +10,20 @@ use rayon::prelude::*;
 use crate::contract::error::{Error, Result};
 use crate::contract::progress::Progress;
 use crate::contract::report::{Converted, Format, Report};
-use crate::contract::settings::{KeepAttributes, Limits, OutputFormat, folder_of};
+use crate::contract::settings::{KeepAttributes, Limits, OutputFormat, Profile, folder_of};
 use crate::engine::carried;
 use crate::engine::clock::Clock;
 use crate::engine::files::{self, Made};
 use crate::engine::work::Work;
 use crate::geometry::position;
 use crate::io::disk_space::{self, Need};
-use crate::io::read::MeshFile;
+use crate::io::read::{MeshFile, Part};
 use crate::io::record::{self, Record};
 use crate::io::rows::Said;
 use crate::io::write_behind::Nameless;
 use crate::output::edit::Edit;
 use crate::output::emit::{self, Content};
-use crate::output::encode::{self, Layout};
+use crate::output::encode::{self, Body, Layout};
 use crate::output::indexed::Indexed;
 use crate::output::model::Account;
 use crate::output::rows::Planned;
@@ -163,22 +163,15 @@ fn write(
     (spool, input): (&Path, &Path),
     output: &Path,
     (planned, layout): (Option<Planned<'_>>, Layout),
-    Work { limits, progress, .. }: Work<'_>,
+    work: Work<'_>,
     clock: &mut Clock,
 ) -> Result<MeshFile> {
+    let Work { limits, progress, .. } = work;
     let made = files::open(spool, limits, progress)?;
-    let written = match &planned {
-        Some(planned) => carried::write(planned, output, limits, progress)?,
-        None => {
-            refuse_repeated(&made, input, layout, limits)?;
-            encode(&made, output, layout, limits, progress)?
-        }
-    };
+    let Some(planned) = &planned else { return encode((&made, &[], input), output, layout, work, clock) };
+    let written = carried::write(planned, output, limits, progress)?;
     clock.stage("encode");
-    match &planned {
-        Some(planned) => carried::confirm(planned, &made, &written)?,
-        None => confirm(&made, &written, limits)?,
-    }
+    carried::confirm(planned, &made, &written)?;
     Ok(written)
 }
 
@@ -201,10 +194,8 @@ pub(crate) fn convert(
     let written = match target.layout {
         Some(layout) if !target.is_input => {
             refuse_infinite(&mesh)?;
-            refuse_repeated(&mesh, input, layout, limits)?;
-            let written = encode(&mesh, output, layout, limits, progress)?;
-            confirm(&mesh, &written, limits)?;
-            written
+            let work = Work { profile: &Profile::default(), limits, progress };
+            encode((&mesh, mesh.parts(), input), output, layout, work, &mut Clock::start())?
         }
         None if !target.is_input => {
             let edit = Edit::default();
@@ -275,13 +266,40 @@ pub(crate) fn copy(input: &Path, output: &Path, limits: &Limits, progress: &dyn 
     files::open(output, limits, progress)
 }
 
-fn encode(made: &MeshFile, output: &Path, layout: Layout, limits: &Limits, progress: &dyn Progress) -> Result<MeshFile> {
-    let indexed = Indexed::of(output, made.records(), limits, progress)?;
-    let name = concat!("Suture ", env!("CARGO_PKG_VERSION"));
-    encode::write((&indexed, made.records().len()), (layout, name), output, limits, progress)?;
-    drop(indexed);
+/// Writes the triangles of `made` to the new file `output`, in meshes of their own where there are `parts` and the format holds several; reads the file
+/// back, and compares.
+///
+/// # Errors
+/// [`Error`], any of them; [`Error::Refused`] for a triangle that the format cannot hold: `input` is the file that has it.
+pub(crate) fn encode(
+    (made, parts, input): (&MeshFile, &[Part], &Path),
+    output: &Path,
+    layout: Layout,
+    Work { limits, progress, .. }: Work<'_>,
+    clock: &mut Clock,
+) -> Result<MeshFile> {
+    refuse_repeated(made, input, layout, limits)?;
+    let whole = [Part { name: String::new(), triangles: 0..made.records().len() }];
+    let parts = if layout.holds_several() && parts.len() > 1 { parts } else { &whole };
+    let body = |part: &'_ Part| {
+        let records = made.records().get(part.triangles.clone()).unwrap_or_default();
+        Ok((Indexed::of(output, records, limits, progress)?, records.len()))
+    };
+    let bodies: Result<Vec<_>> = parts.iter().map(body).collect();
+    let bodies: Vec<_> =
+        bodies?.into_iter().zip(parts).map(|((mesh, records), part)| Body { name: &part.name, mesh, records }).collect();
+    encode::write(&bodies, (layout, concat!("Suture ", env!("CARGO_PKG_VERSION"))), output, limits, progress)?;
+    drop(bodies);
     made.let_go();
-    files::open(output, limits, progress)
+    let written = files::open(output, limits, progress)?;
+    clock.stage("encode");
+    confirm(made, &written, limits)?;
+    let ranges = |parts: &[Part]| parts.iter().map(|part| part.triangles.clone()).collect::<Vec<_>>();
+    let expected = if parts.len() > 1 { ranges(parts) } else { Vec::new() };
+    if matches!(layout, Layout::Amf(_)) && ranges(written.parts()) != expected {
+        return Err(differs(&written));
+    }
+    Ok(written)
 }
 
 /// Does the written file hold the triangles that were made?
@@ -297,11 +315,12 @@ fn confirm(made: &MeshFile, written: &MeshFile, limits: &Limits) -> Result<()> {
     let holds = parallel::in_pool(limits.threads, || {
         made.len() == records.len() && made.chunks(COMPARED).zip(records.chunks(COMPARED)).all(is_same)
     });
-    if !holds || !written.is_flawless() {
-        let source = std::io::Error::other("the file does not hold what was written to it");
-        return Err(Error::io(written.path(), "reading back")(source));
-    }
-    Ok(())
+    if holds && written.is_flawless() { Ok(()) } else { Err(differs(written)) }
+}
+
+fn differs(written: &MeshFile) -> Error {
+    let source = std::io::Error::other("the file does not hold what was written to it");
+    Error::io(written.path(), "reading back")(source)
 }
 
 #[cfg(test)]

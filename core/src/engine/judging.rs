@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use crate::contract::error::{Error, Result};
+use crate::contract::hint::HintKind;
 use crate::contract::progress::Progress;
 use crate::contract::report::{
     BoundaryLoops, Certificate, Cost, Defects, EditSummary, FileFacts, Outcome, Regions, Repair, RepairName, Report,
@@ -245,6 +246,11 @@ pub(crate) fn advise(report: &mut Report, evidence: &Evidence) {
 /// The certificate of a file of these facts, counts and flaws.
 pub(crate) fn certify(facts: &FileFacts, defects: &Defects, flaws: &[String]) -> Certificate {
     certificate::certify(facts, &Subject { defects, flaws })
+}
+
+/// Takes back the hints on units of a mesh whose file says its unit.
+pub(crate) fn know_the_unit(report: &mut Report) {
+    report.hints.retain(|hint| !matches!(hint.kind, HintKind::Inches | HintKind::Metres));
 }
 
 /// Findings that make a file itself less than flawless.

@@ -56,6 +56,17 @@ pub(crate) fn together(sections: &[Section]) -> Option<Report> {
     Some(all)
 }
 
+/// Gives the certificate the bytes that it is of.
+pub(crate) fn certify(report: &mut Report) {
+    let facts = report.output.as_ref().unwrap_or(&report.input);
+    if let Some(certificate) = &mut report.certificate {
+        (certificate.blake3, certificate.bytes, certificate.triangles) = (facts.blake3.clone(), facts.bytes, facts.triangles);
+        if let Some(faithful) = &mut certificate.faithful {
+            (faithful.original, faithful.bytes) = (report.input.blake3.clone(), report.input.bytes);
+        }
+    }
+}
+
 fn name_reasons(verdict: &mut Verdict, label: &str) {
     verdict.reasons.iter_mut().for_each(|reason| *reason = format!("{label}: {reason}"));
 }

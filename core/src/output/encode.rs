@@ -47,39 +47,73 @@ pub(crate) enum Layout {
     ThreeMf(&'static str),
 }
 
-/// Text before, between and behind vertices and faces.
+/// A mesh of a file.
+pub(crate) struct Body<'r> {
+    /// Empty for the only one.
+    pub(crate) name: &'r str,
+    pub(crate) mesh: Indexed<'r>,
+    /// So many triangles.
+    pub(crate) records: usize,
+}
+
+/// Text before and behind all meshes, and between and behind the vertices and faces of each.
 struct Frame {
     head: String,
     between: &'static str,
-    tail: &'static str,
+    behind: &'static str,
+    tail: String,
 }
 
 impl Layout {
-    /// Around so many vertices and faces of a mesh of this name.
-    fn frame(self, vertices: u32, faces: usize, name: &str) -> Frame {
+    /// A file may hold several meshes.
+    pub(crate) fn holds_several(self) -> bool {
+        matches!(self, Self::Amf(_) | Self::ThreeMf(_))
+    }
+
+    /// Around these meshes in a file of this name.
+    fn frame(self, bodies: &[Body<'_>], name: &str) -> Frame {
+        let vertices: u64 = bodies.iter().map(|body| u64::from(body.mesh.vertices())).sum();
+        let faces: usize = bodies.iter().map(|body| body.records).sum();
+        let plain = |head: String| Frame { head, between: "", behind: "", tail: String::new() };
         match self {
             Self::Ply => {
                 // Most readers take indices as signed.
                 let index = if i32::try_from(vertices).is_ok() { "int" } else { "uint" };
-                let head = format!(
+                plain(format!(
                     "ply\nformat binary_little_endian 1.0\ncomment {name}\nelement vertex {vertices}\nproperty float x\nproperty float y\n\
                      property float z\nelement face {faces}\nproperty list uchar {index} vertex_indices\nend_header\n"
-                );
-                Frame { head, between: "", tail: "" }
+                ))
             }
-            Self::Off => Frame { head: format!("OFF\n# {name}\n{vertices} {faces} 0\n"), between: "", tail: "" },
-            Self::Obj => Frame { head: format!("# {name}\n# {vertices} vertices, {faces} faces\n"), between: "", tail: "" },
+            // Readers refuse a comment before the counts, MeshLib's among them.
+            Self::Off => plain(format!("OFF\n{vertices} {faces} 0\n")),
+            Self::Obj => plain(format!("# {name}\n# {vertices} vertices, {faces} faces\n")),
             Self::Amf(unit) => {
                 let name = escaped(name);
                 let head = format!(
-                    "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<amf unit=\"{unit}\" version=\"1.2\">\n<metadata type=\"name\">{name}</metadata>\n\
-                     <object id=\"0\">\n<mesh>\n<vertices>\n"
+                    "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<amf unit=\"{unit}\" version=\"1.2\">\n<metadata type=\"name\">{name}</metadata>\n"
                 );
-                Frame { head, between: "</vertices>\n<volume>\n", tail: "</volume>\n</mesh>\n</object>\n</amf>\n" }
+                let behind = "</volume>\n</mesh>\n</object>\n";
+                Frame { head, between: "</vertices>\n<volume>\n", behind, tail: "</amf>\n".into() }
             }
-            Self::ThreeMf(unit) => {
-                Frame { head: package::head(unit, &escaped(name)), between: package::BETWEEN, tail: package::TAIL }
+            Self::ThreeMf(unit) => Frame {
+                head: package::head(unit, &escaped(name)),
+                between: package::BETWEEN,
+                behind: package::OBJECT_END,
+                tail: package::tail(bodies.len()),
+            },
+        }
+    }
+
+    /// Before the vertices of the mesh of this number and name.
+    fn object(self, number: usize, name: &str) -> String {
+        match self {
+            Self::Ply | Self::Off | Self::Obj => String::new(),
+            Self::Amf(_) => {
+                let name = escaped(name);
+                let name = if name.is_empty() { name } else { format!("<metadata type=\"name\">{name}</metadata>\n") };
+                format!("<object id=\"{number}\">\n{name}<mesh>\n<vertices>\n")
             }
+            Self::ThreeMf(_) => package::object(number, &escaped(name)),
         }
     }
 
@@ -133,9 +167,9 @@ impl Layout {
     }
 }
 
-/// As the text of an XML element.
+/// As the text of an XML element, or the value of an attribute.
 fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
 /// The shortest decimal that reads back as the same number.
@@ -159,32 +193,59 @@ fn integer(mut value: u64, out: &mut Vec<u8>) {
     out.extend_from_slice(&digits[at..]);
 }
 
-/// Writes `mesh`, of so many records, to the new file `output`, and syncs it unless that is deferred. `name` stands in it as a comment.
+/// Writes these meshes to the new file `output`, and syncs it unless that is deferred. `name` stands in it as a comment. Formats that hold one mesh
+/// are given one.
 ///
 /// # Errors
 /// [`Error::Io`], cancellation among them.
 pub(crate) fn write(
-    (mesh, records): (&Indexed<'_>, usize),
+    bodies: &[Body<'_>],
     (layout, name): (Layout, &str),
     output: &Path,
     limits: &Limits,
     progress: &dyn Progress,
 ) -> Result<()> {
-    let Frame { head, between, tail } = layout.frame(mesh.vertices(), records, name);
-    let steps = Steps { records, output, progress };
+    let Frame { head, between, behind, tail } = layout.frame(bodies, name);
+    let mut steps = Steps { done: 0, all: 2 * bodies.iter().map(|body| body.records as u64).sum::<u64>(), output, progress };
     let fill = |sink: &mut Sink<'_>| {
         sink(head.as_bytes())?;
+        for (number, body) in bodies.iter().enumerate() {
+            sink(layout.object(number, body.name).as_bytes())?;
+            body.put(layout, between, &mut steps, sink)?;
+            sink(behind.as_bytes())?;
+        }
+        sink(tail.as_bytes())
+    };
+    parallel::in_pool(limits.threads, || match layout {
+        Layout::ThreeMf(_) => {
+            let most: u64 = bodies.iter().map(Body::most_text).sum();
+            package::write(output, MOST_AROUND + most, fill, limits, progress)
+        }
+        _ => to_file(output, fill, limits),
+    })
+}
+
+impl Body<'_> {
+    /// Most bytes of its text in a 3MF.
+    fn most_text(&self) -> u64 {
+        // A character of its name may be an entity.
+        let around = MOST_AROUND + 6 * self.name.len() as u64;
+        around + u64::from(self.mesh.vertices()) * MOST_A_VERTEX + self.records as u64 * MOST_A_TRIANGLE
+    }
+
+    /// Writes its vertices, and its faces.
+    fn put(&self, layout: Layout, between: &str, steps: &mut Steps<'_>, sink: &mut Sink<'_>) -> Result<()> {
         let vertices = |range: Range<usize>| {
             let mut text = Vec::new();
-            mesh.positions(range).for_each(|point| layout.vertex(point, &mut text));
+            self.mesh.positions(range).for_each(|point| layout.vertex(point, &mut text));
             text
         };
-        steps.each(0, |pieces| pieces.into_par_iter().map(vertices).collect(), sink)?;
+        steps.each(self.records, |pieces| pieces.into_par_iter().map(vertices).collect(), sink)?;
         sink(between.as_bytes())?;
-        let mut cursor = mesh.cursor();
+        let mut cursor = self.mesh.cursor();
         let faces = |pieces: Vec<Range<usize>>| {
             // Numbers are read in order; their text is made side by side.
-            let numbers: Vec<_> = pieces.into_iter().map(|range| mesh.faces(range, &mut cursor)).collect();
+            let numbers: Vec<_> = pieces.into_iter().map(|range| self.mesh.faces(range, &mut cursor)).collect();
             let text = |faces: Vec<[u32; 3]>| {
                 let mut text = Vec::new();
                 faces.into_iter().for_each(|face| layout.face(face, &mut text));
@@ -192,16 +253,8 @@ pub(crate) fn write(
             };
             numbers.into_par_iter().map(text).collect()
         };
-        steps.each(1, faces, sink)?;
-        sink(tail.as_bytes())
-    };
-    parallel::in_pool(limits.threads, || match layout {
-        Layout::ThreeMf(_) => {
-            let most = MOST_AROUND + u64::from(mesh.vertices()) * MOST_A_VERTEX + records as u64 * MOST_A_TRIANGLE;
-            package::write(output, most, fill, limits, progress)
-        }
-        _ => to_file(output, fill, limits),
-    })
+        steps.each(self.records, faces, sink)
+    }
 }
 
 /// Writes what `fill` gives to the new file `output`.
@@ -213,31 +266,33 @@ fn to_file(output: &Path, fill: impl FnOnce(&mut Sink<'_>) -> Result<()>, limits
     if limits.defer_sync { Ok(()) } else { file.sync_all().map_err(Error::io(output, "syncing")) }
 }
 
-/// The way through all records, twice.
+/// The way through the records of all meshes, twice through each.
 struct Steps<'a> {
-    records: usize,
+    done: u64,
+    all: u64,
     output: &'a Path,
     progress: &'a dyn Progress,
 }
 
 impl Steps<'_> {
-    /// Makes bytes of all records, some pieces at a time, and takes them in their order.
+    /// Makes bytes of so many records, some pieces at a time, and takes them in their order.
     fn each(
-        &self,
-        round: usize,
+        &mut self,
+        records: usize,
         mut make: impl FnMut(Vec<Range<usize>>) -> Vec<Vec<u8>> + Send,
         take: &mut Sink<'_>,
     ) -> Result<()> {
         let at_once = 2 * PIECE * rayon::current_num_threads();
         let mut waiting: Vec<Vec<u8>> = Vec::new();
-        for from in (0..self.records).step_by(at_once) {
-            let to = self.records.min(from + at_once);
+        for from in (0..records).step_by(at_once) {
+            let to = records.min(from + at_once);
             let pieces = (from..to).step_by(PIECE).map(|first| first..to.min(first + PIECE)).collect();
             // Written while the next ones are made.
             let (taken, made) = rayon::join(|| waiting.iter().try_for_each(|bytes| take(bytes)), || make(pieces));
             taken?;
             waiting = made;
-            self.progress.at("encode", (round * self.records + from) as u64, 2 * self.records as u64);
+            self.progress.at("encode", self.done, self.all);
+            self.done += (to - from) as u64;
             if self.progress.cancelled() {
                 return Err(Error::cancelled(self.output, "writing"));
             }
@@ -262,7 +317,8 @@ mod tests {
         let output = folder.path().join("out");
         let limits = Limits { threads: 2, spool: Some(folder.path().into()), ..Limits::default() };
         let mesh = Indexed::of(Path::new("a"), records, &limits, &Quiet).unwrap();
-        write((&mesh, records.len()), (layout, "a & b"), &output, &limits, &Quiet).unwrap();
+        let bodies = [Body { name: "", mesh, records: records.len() }];
+        write(&bodies, (layout, "a & b"), &output, &limits, &Quiet).unwrap();
         std::fs::read(output).unwrap()
     }
 
@@ -274,7 +330,7 @@ mod tests {
     #[test]
     fn text_holds_each_position_once() {
         let off = written(&two_triangles(), Layout::Off);
-        let expected = "OFF\n# a & b\n4 2 0\n0 0 0\n1.5 0 0\n0 1e-7 0\n0 0 2e20\n3 0 1 2\n3 2 1 3\n";
+        let expected = "OFF\n4 2 0\n0 0 0\n1.5 0 0\n0 1e-7 0\n0 0 2e20\n3 0 1 2\n3 2 1 3\n";
         assert_eq!(String::from_utf8(off).unwrap(), expected);
         let obj = String::from_utf8(written(&two_triangles(), Layout::Obj)).unwrap();
         assert!(obj.ends_with("v 0 0 2e20\nf 1 2 3\nf 3 2 4\n"), "{obj}");

@@ -1,10 +1,10 @@
 //! A new 3MF package around the text of one model.
 //!
 //! **In:** the unit, and the text of vertices and triangles, piece by piece.
-//! **Out:** a package of three parts: content types, relationships, the model of one object that is built once where it is.
+//! **Out:** a package of three parts: content types, relationships, the model, each object of which is built once where it is.
 //! **Promise:** the same bytes for any memory, any threads, any time and any name of the file.
 //!
-//! By the 3MF Core Specification 1.3, chapters 2 to 4, and the Open Packaging Conventions (ECMA-376, part 2). The object has no name: slicers call it by
+//! By the 3MF Core Specification 1.3, chapters 2 to 4, and the Open Packaging Conventions (ECMA-376, part 2). A single object has no name: slicers call it by
 //! the name of the file then, which the engine does not know (a hot folder's result may be renamed, and used for another file of the same content).
 
 use std::path::Path;
@@ -26,16 +26,27 @@ const NAMESPACE: &str = "http://schemas.microsoft.com/3dmanufacturing/core/2015/
 
 /// Between vertices and triangles.
 pub(super) const BETWEEN: &str = "</vertices>\n<triangles>\n";
-/// Behind the triangles.
-pub(super) const TAIL: &str =
-    "</triangles>\n</mesh>\n</object>\n</resources>\n<build>\n<item objectid=\"1\"/>\n</build>\n</model>\n";
+/// Behind the triangles of an object.
+pub(super) const OBJECT_END: &str = "</triangles>\n</mesh>\n</object>\n";
 
-/// Before the vertices. `application`: the program that wrote it.
+/// Before the first object. `application`: the program that wrote it.
 pub(super) fn head(unit: &str, application: &str) -> String {
     format!(
         "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<model unit=\"{unit}\" xml:lang=\"en-US\" xmlns=\"{NAMESPACE}\">\n\
-         <metadata name=\"Application\">{application}</metadata>\n<resources>\n<object id=\"1\" type=\"model\">\n<mesh>\n<vertices>\n"
+         <metadata name=\"Application\">{application}</metadata>\n<resources>\n"
     )
+}
+
+/// Before the vertices of the object of this number, from 0; it may have no name.
+pub(super) fn object(number: usize, name: &str) -> String {
+    let name = if name.is_empty() { String::new() } else { format!(" name=\"{name}\"") };
+    format!("<object id=\"{}\" type=\"model\"{name}>\n<mesh>\n<vertices>\n", number + 1)
+}
+
+/// Behind the last of so many objects.
+pub(super) fn tail(objects: usize) -> String {
+    let items: String = (1..=objects).map(|id| format!("<item objectid=\"{id}\"/>\n")).collect();
+    format!("</resources>\n<build>\n{items}</build>\n</model>\n")
 }
 
 /// Writes a package to the new file `output`, and syncs it unless that is deferred. `fill` gives the text of the model, of so many bytes at most. Call it

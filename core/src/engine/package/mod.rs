@@ -21,7 +21,7 @@ use crate::engine::carried;
 use crate::engine::clock::Clock;
 use crate::engine::files;
 use crate::engine::formats;
-use crate::engine::together::together;
+use crate::engine::together::{certify, together};
 use crate::engine::work::Work;
 use crate::io::disk_space::{self, Need};
 use crate::io::read::PackageFile;
@@ -156,17 +156,6 @@ fn judge(package: &PackageFile, changed: &Changed, report: &mut Report, profile:
         carried::ask_for_review(report, "the package is signed, and no signature holds of a package that was changed".into());
     }
     true
-}
-
-/// Gives the certificate the bytes that it is of.
-fn certify(report: &mut Report) {
-    let facts = report.output.as_ref().unwrap_or(&report.input);
-    if let Some(certificate) = &mut report.certificate {
-        (certificate.blake3, certificate.bytes, certificate.triangles) = (facts.blake3.clone(), facts.bytes, facts.triangles);
-        if let Some(faithful) = &mut certificate.faithful {
-            (faithful.original, faithful.bytes) = (report.input.blake3.clone(), report.input.bytes);
-        }
-    }
 }
 
 fn facts(package: &PackageFile, blake3: String, triangles: u64) -> FileFacts {

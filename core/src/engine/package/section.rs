@@ -1,7 +1,6 @@
 //! The report of one mesh of a package.
 
 use super::units::UnitOf;
-use crate::contract::hint::HintKind;
 use crate::contract::report::{Outcome, Report, Task};
 use crate::engine::judging;
 use crate::engine::together::Section;
@@ -10,7 +9,7 @@ use crate::io::read::{Finding, PackageFile};
 /// The report of one mesh as a section of the package's.
 pub(super) fn section(package: &PackageFile, unit: &UnitOf, mut report: Report, findings: &[Finding]) -> Section {
     // A package says its unit.
-    report.hints.retain(|hint| !matches!(hint.kind, HintKind::Inches | HintKind::Metres));
+    judging::know_the_unit(&mut report);
     let flaws = judging::flaws(findings);
     report.input.findings = findings.iter().map(|finding| finding.text.clone()).collect();
     if report.task == Task::Inspect && !flaws.is_empty() {

@@ -1,15 +1,12 @@
 //! The meshes of an object: all of it, or the volumes of a slicer's project.
 
-use std::fs::File;
 use std::ops::Range;
-use std::path::Path;
 
 use crate::contract::error::{Error, Result};
-use crate::contract::settings::Limits;
-use crate::engine::files;
+use crate::engine::nameless_stl;
 use crate::engine::work::Work;
-use crate::io::read::{MeshFile, MeshRecords, PREFIX_BYTES, PackageFile, Place};
-use crate::io::write_behind::{self, Nameless};
+use crate::io::read::{MeshFile, MeshRecords, PackageFile, Place};
+use crate::io::write_behind::Nameless;
 
 /// Triangles of an object that are one mesh.
 pub(super) struct UnitOf {
@@ -60,22 +57,7 @@ pub(super) fn of(package: &PackageFile, place: Place, read: &MeshRecords) -> Res
 /// # Errors
 /// [`Error::NoSpace`], [`Error::Io`].
 pub(super) fn spooled(package: &PackageFile, unit: &UnitOf, read: &MeshRecords, work: Work<'_>) -> Result<(MeshFile, Nameless)> {
-    let file = stl(package.path(), read, unit.triangles.clone(), work.limits)?;
-    let spool = Nameless::of(file);
-    Ok((files::open(&spool.path(), work.limits, work.progress)?.called(package.path()), spool))
-}
-
-fn stl(path: &Path, read: &MeshRecords, triangles: Range<usize>, limits: &Limits) -> Result<File> {
     let all = &read.parsed.records;
-    let records = all.all().get(triangles).unwrap_or_default();
-    let bytes = (PREFIX_BYTES + size_of_val(records)) as u64;
-    write_behind::spooled(path, limits, (bytes, "the triangles of an object"), |append| {
-        append(&read.parsed.header)?;
-        append(&(records.len() as u32).to_le_bytes())?;
-        records.chunks(1 << 14).try_for_each(|chunk| {
-            append(chunk.as_flattened())?;
-            all.let_go();
-            Ok(())
-        })
-    })
+    let records = all.all().get(unit.triangles.clone()).unwrap_or_default();
+    nameless_stl::open(package.path(), &read.parsed.header, records, || all.let_go(), work)
 }

@@ -70,6 +70,7 @@ pub(super) fn mesh(model: &Model, wanted: fn(&Object) -> bool, bytes: usize, con
         unit: Some(model.unit().name()),
         positions: None,
         coloured: false,
+        parts: Vec::new(),
     })
 }
 

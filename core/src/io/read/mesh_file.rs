@@ -4,7 +4,7 @@ use super::access::Bytes;
 use super::finding::Finding;
 use super::limits::HEADER_BYTES;
 use super::opened::Opened;
-use super::parsed::Parsed;
+use super::parsed::{Parsed, Part};
 use super::rounding::Rounding;
 use super::spool::{Context, Items};
 use super::vertices::{Positions, Vertices};
@@ -44,6 +44,7 @@ pub struct MeshFile {
     unit: Option<&'static str>,
     positions: Option<Positions>,
     coloured: bool,
+    parts: Vec<Part>,
 }
 
 /// What the bytes of a file hold.
@@ -55,6 +56,7 @@ pub(super) struct Content {
     unit: Option<&'static str>,
     positions: Option<Positions>,
     coloured: bool,
+    parts: Vec<Part>,
 }
 
 impl Content {
@@ -77,6 +79,7 @@ impl Content {
                     unit: None,
                     positions: None,
                     coloured: false,
+                    parts: Vec::new(),
                 })
             }
             sniff::Kind::Text(sniff::Text { start, mut findings }) => {
@@ -126,9 +129,18 @@ impl Content {
 
     /// `findings`: those of the bytes themselves.
     fn parsed(parsed: Parsed, format: Format, findings: Vec<Finding>) -> Self {
-        let Parsed { records, findings: mut found, header, rounding, unit, positions, coloured } = parsed;
+        let Parsed { records, findings: mut found, header, rounding, unit, positions, coloured, parts } = parsed;
         found.extend(rounding.map(Rounding::finding));
-        Self { source: Source::Spooled(records), format, findings: [findings, found].concat(), header, unit, positions, coloured }
+        Self {
+            source: Source::Spooled(records),
+            format,
+            findings: [findings, found].concat(),
+            header,
+            unit,
+            positions,
+            coloured,
+            parts,
+        }
     }
 }
 
@@ -145,8 +157,8 @@ impl MeshFile {
         let (opened, input) = Opened::bytes(path, spool, limits, progress)?;
         let kind = sniff::sniff(&input).map_err(|rejection| rejection.at(path))?;
         let content = Content::of(kind, &input, &Context { path, spool, limits, progress, passed: None })?;
-        let Content { source, format, findings, header, unit, positions, coloured } = content;
-        Ok(Self { opened, name: path.to_owned(), input, source, format, findings, header, unit, positions, coloured })
+        let Content { source, format, findings, header, unit, positions, coloured, parts } = content;
+        Ok(Self { opened, name: path.to_owned(), input, source, format, findings, header, unit, positions, coloured, parts })
     }
 
     /// The triangles in input order, those with NaN or infinite coordinates included.
@@ -232,6 +244,11 @@ impl MeshFile {
     /// The positions that its faces name by number, where it has one table of them.
     pub(crate) fn vertices(&self) -> Option<Vertices<'_>> {
         Some(self.positions.as_ref()?.vertices(&self.input))
+    }
+
+    /// Meshes that are never welded to each other, one behind the other, all triangles in them; none where all of it is one mesh.
+    pub(crate) fn parts(&self) -> &[Part] {
+        &self.parts
     }
 
     /// It has colours or materials in a form that no result keeps.

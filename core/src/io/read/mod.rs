@@ -52,6 +52,7 @@ pub use finding::{Finding, Loss};
 pub use limits::{HEADER_BYTES, MAX_TRIANGLES, PREFIX_BYTES};
 pub use mesh_file::MeshFile;
 pub(crate) use package_file::PackageFile;
+pub(crate) use parsed::Part;
 pub use tail::ends_in_zeros;
 pub(crate) use threemf::slicer;
 pub(crate) use threemf::{MeshRecords, Place};

@@ -51,7 +51,16 @@ pub(super) fn read(bytes: &[u8], context: &Context<'_>) -> Result<Parsed> {
         tail::behind_text(whole, zeros)
     });
     let (records, positions) = (faces.map()?, Some(Positions::Spooled(positions)));
-    Ok(Parsed { records, findings, header: binary::header_of(b""), rounding: gathered.1, unit: None, positions, coloured: false })
+    Ok(Parsed {
+        records,
+        findings,
+        header: binary::header_of(b""),
+        rounding: gathered.1,
+        unit: None,
+        positions,
+        coloured: false,
+        parts: Vec::new(),
+    })
 }
 
 /// Whether `bytes` begin with a keyword of OFF, after blanks and comments.

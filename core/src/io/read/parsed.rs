@@ -1,10 +1,21 @@
 //! A file that was parsed.
 
+use std::ops::Range;
+
 use super::finding::Finding;
 use super::limits::HEADER_BYTES;
 use super::rounding::Rounding;
 use super::spool::Items;
 use super::vertices::Positions;
+
+/// A mesh of its own in a file of several.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Part {
+    /// As the file calls it; without control characters.
+    pub(crate) name: String,
+    /// Its triangles among all of the file.
+    pub(crate) triangles: Range<usize>,
+}
 
 /// A file that was parsed.
 #[derive(Debug)]
@@ -22,4 +33,6 @@ pub(crate) struct Parsed {
     pub(crate) positions: Option<Positions>,
     /// It has colours or materials in a form that no result keeps.
     pub(crate) coloured: bool,
+    /// Meshes that are never welded to each other, one behind the other, all triangles in them; none where all of the file is one mesh.
+    pub(crate) parts: Vec<Part>,
 }

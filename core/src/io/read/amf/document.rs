@@ -18,7 +18,7 @@ const LONGEST_NAME: usize = 80;
 /// Bytes of an id, a unit or a type at most; what is longer counts as absent.
 const LONGEST_WORD: usize = 1 << 16;
 /// Names of objects that are kept.
-pub(super) const NAMES_KEPT: usize = 5;
+pub(super) const NAMES_KEPT: usize = 1 << 10;
 
 /// An id by its hash, so that long ids take no memory.
 pub(super) type Id = u128;
@@ -80,8 +80,9 @@ pub(super) struct Document {
     /// Objects and constellations in their order.
     pub(super) items: Vec<Item>,
     pub(super) objects: Vec<Object>,
-    /// Names or ids of the first objects, by their numbers.
+    /// Names or ids of the first objects, by their numbers, and names alone.
     pub(super) names: Vec<Vec<u8>>,
+    pub(super) titles: Vec<Vec<u8>>,
     pub(super) meshes: Vec<Mesh>,
     constellations: Vec<Constellation>,
     pub(super) instances: Vec<Instance>,
@@ -178,6 +179,9 @@ impl Document {
                         let kind = if name == b"volume" { Kind::Triangles } else { Kind::Vertices };
                         self.is_coloured |= word(&tag, b"materialid").is_some();
                         self.supports += u64::from(kind == Kind::Triangles && word(&tag, b"type").as_deref() == Some(b"support"));
+                        if kind == Kind::Triangles {
+                            self.volume()?;
+                        }
                         if !tokens.is_empty() {
                             self.children((text, tokens), kind, context, intake)?;
                         }
@@ -211,8 +215,11 @@ impl Document {
     ) -> std::result::Result<(), Stop> {
         let (at, end) = intake.read(text, tokens.at(), (kind, tokens.open().len()), context)?;
         tokens.go_on_at(at);
-        if let Some(mesh) = self.meshes.last_mut() {
+        let first = self.meshes.last().map_or(0, |mesh| mesh.positions.start);
+        for mesh in self.meshes.iter_mut().rev().take_while(|mesh| mesh.positions.start == first) {
             mesh.positions.end = intake.positions.count();
+        }
+        if let Some(mesh) = self.meshes.last_mut() {
             mesh.indices.end = intake.indices.count();
             mesh.rounding.append(std::mem::take(&mut intake.rounding));
         }
@@ -240,6 +247,21 @@ impl Document {
         Ok(())
     }
 
+    /// Begins a volume of the last mesh: the second one and those behind it are meshes of their own on the same vertices.
+    fn volume(&mut self) -> std::result::Result<(), Stop> {
+        let Some(mesh) = self.meshes.last().filter(|mesh| !mesh.indices.is_empty()) else { return Ok(()) };
+        let (positions, end) = (mesh.positions.clone(), mesh.indices.end);
+        if self.count().is_err() {
+            // Too many to be told apart.
+            return Ok(());
+        }
+        self.meshes.push(Mesh { positions, indices: end..end, rounding: Rounding::default() });
+        if let Some(object) = self.objects.last_mut() {
+            object.meshes.end = self.meshes.len();
+        }
+        Ok(())
+    }
+
     /// Reads an element that has begun, or its beginning.
     fn element(&mut self, tag: Tag<'_>, tokens: &mut Tokens<'_>) -> std::result::Result<(), Stop> {
         match *tokens.open() {
@@ -250,6 +272,7 @@ impl Document {
                 if self.names.len() < NAMES_KEPT {
                     let name = id.clone().unwrap_or_default();
                     self.names.push(name.get(..LONGEST_NAME).unwrap_or(&name).to_vec());
+                    self.titles.push(Vec::new());
                 }
                 self.items.push(Item::Object(self.objects.len()));
                 let meshes = self.meshes.len()..self.meshes.len();
@@ -270,8 +293,10 @@ impl Document {
                 if self.name_of_object.is_empty() {
                     self.name_of_object.clone_from(&name);
                 }
-                let last = self.objects.len().checked_sub(1).and_then(|last| self.names.get_mut(last));
-                last.filter(|_| !name.is_empty()).into_iter().for_each(|known| known.clone_from(&name));
+                let last = self.objects.len().wrapping_sub(1);
+                for names in [&mut self.names, &mut self.titles].into_iter().filter(|_| !name.is_empty()) {
+                    names.get_mut(last).into_iter().for_each(|known| known.clone_from(&name));
+                }
             }
             [.., name] => self.is_coloured |= is_colour(name),
             [] => {}

@@ -31,16 +31,19 @@ use super::binary;
 use super::finding::{Finding, Loss, Rejection};
 use super::limits::most_copies;
 use super::number::COMMA;
-use super::parsed::Parsed;
+use super::parsed::{Parsed, Part};
 use super::spool::Context;
 use crate::contract::error::Result;
 use crate::util::words::{Count, Counted};
 use constellation::Names;
-use document::{Document, NAMES_KEPT};
+use document::Document;
 use intake::Intake;
-use placed::Placed;
+use placed::{PartOf, Placed};
 use stretch::Notes;
 use xml::{Token, Tokens};
+
+/// Names of objects that are told.
+const SHOWN: usize = 5;
 
 /// Is this a text whose root is `amf`, after a byte order mark, blanks, comments and declarations?
 pub(super) fn is_amf(bytes: &[u8]) -> bool {
@@ -91,9 +94,24 @@ pub(super) fn read(text: &[u8], bytes: usize, context: &Context<'_>) -> Result<P
     findings.extend(of_placement(&document, &names, &placed));
     let name = if document.name.is_empty() { &document.name_of_object } else { &document.name };
     let header = binary::header_of(name);
+    // What is left of a file may be half a mesh: then nobody knows what belongs together.
+    let is_whole = findings.iter().all(|finding| finding.loss == Loss::None);
+    let parts = if is_whole && placed.parts.len() > 1 { parts(&document, &placed.parts) } else { Vec::new() };
+    findings.extend(of_objects(&document, !parts.is_empty()).filter(|_| placed.objects > 1));
     let (records, rounding) = (placed.records, placed.rounding.if_any());
     let coloured = document.is_coloured || notes.colours > 0;
-    Ok(Parsed { records, findings, header, rounding, unit: unit_of(&document), positions: None, coloured })
+    Ok(Parsed { records, findings, header, rounding, unit: unit_of(&document), positions: None, coloured, parts })
+}
+
+/// The meshes of a file by their names.
+fn parts(document: &Document, parts: &[PartOf]) -> Vec<Part> {
+    let named = |part: &PartOf| {
+        let own = document.titles.get(part.object).map(|name| shown(name)).unwrap_or_default();
+        let volumes = document.meshes(part.object).iter().filter(|mesh| !mesh.indices.is_empty()).count();
+        let name = if volumes > 1 { format!("{own} volume {}", part.mesh + 1) } else { own };
+        Part { name: name.trim().into(), triangles: part.triangles.clone() }
+    };
+    parts.iter().map(named).collect()
 }
 
 /// The name of the unit, if it is one of AMF's.
@@ -195,16 +213,17 @@ fn of_placement(document: &Document, names: &Names, placed: &Placed) -> Vec<Find
         let angles = if document.radians { ", angles in radians" } else { "" };
         found.push(harmless(format!("{constellations} of {instances}: {objects} placed{angles}")));
     }
-    if placed.objects > 1 {
-        let holding = |object: &usize| document.meshes(*object).iter().any(|mesh| !mesh.indices.is_empty());
-        let all = (0..document.objects.len()).filter(holding).count();
-        let names: Vec<_> = document.names.iter().map(|name| shown(name)).collect();
-        let more = if document.objects.len() > NAMES_KEPT { ", …" } else { "" };
-        if all > 1 {
-            found.push(harmless(format!("{} objects ({}{more}), read as one mesh", Count(all as u64), names.join(", "))));
-        }
-    }
     found
+}
+
+/// The objects of a file that places several. `are_apart`: they are repaired one by one.
+fn of_objects(document: &Document, are_apart: bool) -> Option<Finding> {
+    let holding = |object: &usize| document.meshes(*object).iter().any(|mesh| !mesh.indices.is_empty());
+    let all = (0..document.objects.len()).filter(holding).count();
+    let names: Vec<_> = document.names.iter().take(SHOWN).map(|name| shown(name)).collect();
+    let more = if document.objects.len() > SHOWN { ", …" } else { "" };
+    let end = if are_apart { "" } else { ", read as one mesh" };
+    (all > 1).then(|| harmless(format!("{} objects ({}{more}){end}", Count(all as u64), names.join(", "))))
 }
 
 fn harmless(text: String) -> Finding {

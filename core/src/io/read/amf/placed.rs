@@ -1,5 +1,7 @@
 //! Records of the triangles of all objects, wherever they are placed.
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 
 use super::super::faces::{Faces, Tally};
@@ -25,7 +27,21 @@ pub(super) struct Placed {
     pub(super) rounding: Rounding,
     /// Objects that hold triangles, each counted as often as it is placed.
     pub(super) objects: u64,
+    /// Their meshes, in the order of the records; none of more than [`MOST_PARTS`].
+    pub(super) parts: Vec<PartOf>,
 }
+
+/// A mesh that is placed.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct PartOf {
+    pub(super) object: usize,
+    /// Its number among the object's meshes, from 0.
+    pub(super) mesh: usize,
+    pub(super) triangles: Range<usize>,
+}
+
+/// Meshes that are told apart, at most: each is repaired by itself, which takes some milliseconds.
+const MOST_PARTS: usize = 1000;
 
 /// Positions and triangles as they were read.
 #[derive(Clone, Copy)]
@@ -40,7 +56,7 @@ impl<'a> Kept<'a> {
     }
 }
 
-fn part<'a, T>(items: &'a [T], range: &std::ops::Range<u64>) -> &'a [T] {
+fn part<'a, T>(items: &'a [T], range: &Range<u64>) -> &'a [T] {
     items.get(range.start as usize..range.end as usize).unwrap_or_default()
 }
 
@@ -76,15 +92,18 @@ pub(super) fn place(
         tally: Tally::default(),
         rounding: Rounding::default(),
         objects: 0,
+        parts: Vec::new(),
         text,
         steps,
         total,
     };
     constellation::each(document, names, |object, placement| {
         let mut holds = false;
-        for mesh in document.meshes(object) {
+        for (number, mesh) in document.meshes(object).iter().enumerate() {
             holds |= !mesh.indices.is_empty();
+            let from = placing.count();
             placing.mesh(mesh, kept.of(mesh), placement)?;
+            placing.note(PartOf { object, mesh: number, triangles: from..placing.count() });
         }
         placing.objects += u64::from(holds);
         Ok::<(), Stop>(())
@@ -94,8 +113,11 @@ pub(super) fn place(
         Stop::Failed(error) => error,
     })?;
     placing.flush()?;
-    let Placing { spool, tally, rounding, objects, .. } = placing;
-    Ok(Placed { records: spool.map()?, tally, rounding, objects })
+    let Placing { spool, tally, rounding, objects, mut parts, .. } = placing;
+    if parts.len() > MOST_PARTS {
+        parts.clear();
+    }
+    Ok(Placed { records: spool.map()?, tally, rounding, objects, parts })
 }
 
 enum Stop {
@@ -123,12 +145,25 @@ struct Placing<'a, 'c> {
     tally: Tally,
     rounding: Rounding,
     objects: u64,
+    parts: Vec<PartOf>,
     text: u64,
     steps: u64,
     total: u64,
 }
 
 impl Placing<'_, '_> {
+    /// Records so far.
+    fn count(&self) -> usize {
+        self.spool.count() as usize + self.waiting.len()
+    }
+
+    /// Notes a mesh that was placed; of too many, one more than are told apart.
+    fn note(&mut self, part: PartOf) {
+        if !part.triangles.is_empty() && self.parts.len() <= MOST_PARTS {
+            self.parts.push(part);
+        }
+    }
+
     /// Places one mesh.
     fn mesh(&mut self, mesh: &Mesh, kept: Kept<'_>, placement: &Placement) -> Result<()> {
         self.rounding.append(if *placement == Placement::NONE { mesh.rounding } else { rounding(kept, placement) });

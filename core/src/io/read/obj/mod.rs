@@ -127,7 +127,7 @@ pub(super) fn read(bytes: &[u8], start: usize, context: &Context<'_>) -> Result<
     findings.extend(tally.findings());
     let (header, rounding) = (header(&found), found.rounding.if_any());
     let positions = Some(Positions::Spooled(positions));
-    Ok(Parsed { records: records.map()?, findings, header, rounding, unit: None, positions, coloured: false })
+    Ok(Parsed { records: records.map()?, findings, header, rounding, unit: None, positions, coloured: false, parts: Vec::new() })
 }
 
 fn windows_at_a_time() -> usize {

@@ -200,6 +200,15 @@ impl<'a> Reading<'a, '_> {
         }
         let header = binary::header_of(b"");
         let records = faces.map()?;
-        Ok(Parsed { records, findings: self.findings, header, rounding, unit: None, positions: Some(positions), coloured: false })
+        Ok(Parsed {
+            records,
+            findings: self.findings,
+            header,
+            rounding,
+            unit: None,
+            positions: Some(positions),
+            coloured: false,
+            parts: Vec::new(),
+        })
     }
 }

@@ -76,6 +76,7 @@ impl Model {
             unit: None,
             positions: None,
             coloured: false,
+            parts: Vec::new(),
         };
         let TriangleCounts { tally, with_any, .. } = told;
         Ok(MeshRecords { parsed, positions, triangles: tally.faces, with_any })

@@ -5,6 +5,7 @@ mod holes;
 mod judging;
 mod mesh;
 mod picture;
+mod which;
 
 use std::error::Error;
 use std::path::{Path, PathBuf};
@@ -14,7 +15,7 @@ use std::time::Duration;
 use clap::{Args, Parser, Subcommand};
 use compare::{Cache, Options, Side};
 use suture_bench::generate::{self, Case, Density};
-use suture_bench::meaning::{self, Family};
+use which::Which;
 
 #[derive(Parser)]
 #[command(about = "Makes broken meshes, judges meshes, and compares Suture with its peers.")]
@@ -210,36 +211,6 @@ struct Meaning {
     keep: Option<PathBuf>,
     #[command(flatten)]
     options: Closing,
-}
-
-#[derive(Args)]
-struct Which {
-    /// Families, or groups of them (an unknown name lists them); all otherwise.
-    #[arg(long, value_delimiter = ',', value_parser = families)]
-    families: Vec<Named>,
-    /// Files of each family.
-    #[arg(long, default_value_t = 50)]
-    seeds: u64,
-    /// The first seed.
-    #[arg(long, default_value_t = 1)]
-    first: u64,
-}
-
-/// One family, or a group.
-#[derive(Clone)]
-struct Named(Vec<Family>);
-
-fn families(name: &str) -> Result<Named, String> {
-    let found: Vec<_> = meaning::families().filter(|family| family.name == name || family.group == name).collect();
-    let names = || meaning::families().map(|family| family.name).collect::<Vec<_>>().join(", ");
-    if found.is_empty() { Err(format!("the families are {}", names())) } else { Ok(Named(found)) }
-}
-
-impl Which {
-    fn families(&self) -> Vec<Family> {
-        let named: Vec<_> = self.families.iter().flat_map(|named| named.0.iter().copied()).collect();
-        if named.is_empty() { meaning::families().collect() } else { named }
-    }
 }
 
 #[derive(Args)]

@@ -11,7 +11,7 @@ use suture_bench::generate::{self, Case, Density};
 
 use super::cache;
 use super::cgroup::Group;
-use super::child::{self, Cost, Ended};
+use super::child::{self, Ended};
 use super::closing::{Bench, Options};
 use super::error::Error;
 use super::record::Line;
@@ -100,7 +100,7 @@ impl Turns<'_> {
         for round in 0..self.asked.runs {
             let mut again = Vec::new();
             for way in ways {
-                if self.once(file, &way, round)?.exited {
+                if self.once(file, &way, round)? {
                     again.push(way);
                 }
             }
@@ -110,8 +110,8 @@ impl Turns<'_> {
         Ok(())
     }
 
-    /// One process.
-    fn once(&mut self, file: &File, way: &Way, round: usize) -> Result<Cost, Error> {
+    /// One process; false if it was killed.
+    fn once(&mut self, file: &File, way: &Way, round: usize) -> Result<bool, Error> {
         let cached = cache::bring(way.cache, [file.input.as_path()].into_iter());
         let cached_share = cached.map_err(Error::io("filling or emptying the page cache"))?;
         let writes = file.direction == Direction::Write;
@@ -135,6 +135,7 @@ impl Turns<'_> {
         let facts = [("triangles", counted), ("cgroup peak bytes", held)];
         cost.facts.extend(facts.into_iter().filter_map(|(name, value)| Some((name.to_owned(), value?))));
         eprintln!("  {:40} {:>9.3} s wall {:>9.3} s CPU  {}", way.name(), cost.wall_seconds, cost.cpu_seconds, cost.end);
+        let exited = cost.exited;
         let input_bytes = std::fs::metadata(&file.input).map_err(Error::io("looking at an input"))?.len();
         self.bench.journal.write(Line::Transfer(Transfer {
             direction: file.direction,
@@ -146,13 +147,13 @@ impl Turns<'_> {
             order: self.order,
             command: words,
             cached_share,
-            cost: cost.clone(),
+            cost,
         }))?;
         self.order += 1;
         if file.out.exists() {
             remove(&file.out)?;
         }
-        Ok(cost)
+        Ok(exited)
     }
 }
 

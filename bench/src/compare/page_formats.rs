@@ -14,14 +14,15 @@ const ABOUT: &str = "
 ## Formats
 
 A clean generated mesh. `suture convert` makes the file of each format that all programs read, in alternation, from a warm cache unless *cold* is
-said. × is a program's seconds beside Suture's without bounds, in pairs of one round; a peer that is faster is **bold**.
+said. × is a program's seconds beside Suture's without bounds, in pairs of one round. Bounds (`--memory`, a cgroup) are Suture's alone; no peer runs in
+them. A peer that is faster than Suture, or that holds less resident memory, is **bold**.
 
 * **Reading.** Of Suture, the seconds are those of the stage `read` of `suture inspect --no-self-intersections`; of a peer, those of its load call
   alone, with every import before it.
 * **Writing.** The seconds are those of whole processes, from the STL to the synced file. `suture convert` also reads that file back, and compares all
   corners with the STL's. A peer's script imports its library, loads the STL, where vertices of equal position become one, and saves.
 * **Left out.** trimesh, pymeshlab and MeshLib know no AMF, lib3mf knows 3MF alone, and tobj reads OBJ alone. trimesh is given no 3MF beyond 1 M
-  triangles: of 5 M, one takes it a minute and 8 GB. MeshLib reads a 3MF as a scene alone, and refuses an OFF with a comment before its counts, which
+  triangles: one of 5 M takes it about a minute and 8 GB. MeshLib reads a 3MF as a scene alone, and refuses an OFF with a comment before its counts, which
   Suture's files have.
 ";
 
@@ -70,11 +71,11 @@ impl Table<'_> {
             row.extend(others.iter().map(|way| self.beside(format, way, &own)));
             text += &markdown::row(&row);
         }
-        text + &self.processes(&formats, &ways)
+        text + &self.processes(&formats, &ways, &own)
     }
 
     /// Every program's processes.
-    fn processes(&self, formats: &[Format], ways: &[Way]) -> String {
+    fn processes(&self, formats: &[Format], ways: &[Way], own: &Way) -> String {
         let titles = "| format | | wall s | CPU s | resident MB | anonymous MB | cgroup MB | written MB | runs |\n\
                       |---|---|---:|---:|---:|---:|---:|---:|---:|\n";
         let mut rows = String::from(titles);
@@ -86,12 +87,15 @@ impl Table<'_> {
                 let most = |value: fn(&Cost) -> Option<u64>| {
                     or_dash(self.spread(format, way, value).map(|spread| megabytes(spread.most)))
                 };
+                let resident = most(|cost| Some(cost.peak_resident_bytes));
+                let held = |way| self.spread(format, way, |cost| Some(cost.peak_resident_bytes)).map(|spread| spread.most);
+                let is_less = !way.side.is_suture() && held(way).zip(held(own)).is_some_and(|(theirs, ours)| theirs < ours);
                 rows += &markdown::row(&[
                     format.ending().to_uppercase(),
                     way.name(),
                     seconds(|cost| cost.wall_seconds),
                     seconds(|cost| cost.cpu_seconds),
-                    most(|cost| Some(cost.peak_resident_bytes)),
+                    if is_less { format!("**{resident}**") } else { resident },
                     most(|cost| cost.peak_anonymous_bytes),
                     most(|cost| cost.facts.get("cgroup peak bytes").copied()),
                     most(|cost| cost.output_bytes),
@@ -169,6 +173,7 @@ mod tests {
         let read = |format, side, round, seconds| transfer(Direction::Read, format, side, round, seconds);
         let mut late = read(Format::Obj, Side::Tobj, 0, 9.0);
         (late.cost.code, late.cost.end) = (None, "over the time limit of 9 s".into());
+        late.cost.peak_resident_bytes = 1_000_000;
         let page = page(vec![
             read(Format::Ply, Side::InspectNoSi, 0, 1.0),
             read(Format::Ply, Side::InspectNoSi, 1, 2.0),
@@ -184,6 +189,7 @@ mod tests {
         let ply = "| PLY | 4.00 | 1.50 (1.00–2.00) | 2.00 | 0.500; **0.500 ×** | 4.50 (4.00–5.00); 3.25 × | – |\n";
         assert!(page.contains(ply), "{page}");
         assert!(page.contains("| OBJ | 4.00 | 1.00 | 2.00 | – | – | over the time limit of 9 s |\n"), "{page}");
+        assert!(page.contains("| OBJ | tobj | 10.0 | 0.000 | **1.00** |"), "{page}");
         assert!(page.contains("| PLY | meshlib-formats | 5.50 | 0.000 | 2.00 | – | – | – | 2 |\n"), "{page}");
     }
 

@@ -234,10 +234,10 @@ struct Formats {
     /// Runs of every program over every file, in alternation.
     #[arg(long, default_value_t = 3)]
     runs: usize,
-    /// Run suture once more in every round, told to use this much memory.
+    /// Memory that suture is told to use in one more run of each round, such as 512MiB.
     #[arg(long)]
     memory: Option<String>,
-    /// Run it once more in a memory cgroup of so many MiB, with a cold cache (usually needs root).
+    /// Hold that one more run of suture in a memory cgroup of so many MiB, from a cold cache (usually needs root).
     #[arg(long, value_name = "MIB")]
     cgroup: Option<u64>,
     #[command(flatten)]

@@ -2,8 +2,10 @@
 
 mod compare;
 mod holes;
+mod judging;
 mod mesh;
 mod picture;
+mod which;
 
 use std::error::Error;
 use std::path::{Path, PathBuf};
@@ -11,10 +13,9 @@ use std::process::ExitCode;
 use std::time::Duration;
 
 use clap::{Args, Parser, Subcommand};
-use compare::{Cache, Judged, Options, Side};
+use compare::{Cache, Options, Side};
 use suture_bench::generate::{self, Case, Density};
-use suture_bench::judge::{self, Judgement, Same};
-use suture_bench::meaning::{self, Family};
+use which::Which;
 
 #[derive(Parser)]
 #[command(about = "Makes broken meshes, judges meshes, and compares Suture with its peers.")]
@@ -114,6 +115,11 @@ enum Task {
         #[command(flatten)]
         options: Closing,
     },
+    /// Measure how fast suture and its peers read and write each format, and publish it.
+    Formats(Formats),
+    /// Load one OBJ by tobj, and print the seconds as JSON: a process that `formats` measures.
+    #[command(hide = true)]
+    LoadObj { file: PathBuf },
     /// Make RESULTS.md, the plots and the README's table from the raw runs that are kept.
     Publish(Publish),
 }
@@ -208,36 +214,6 @@ struct Meaning {
 }
 
 #[derive(Args)]
-struct Which {
-    /// Families, or groups of them (an unknown name lists them); all otherwise.
-    #[arg(long, value_delimiter = ',', value_parser = families)]
-    families: Vec<Named>,
-    /// Files of each family.
-    #[arg(long, default_value_t = 50)]
-    seeds: u64,
-    /// The first seed.
-    #[arg(long, default_value_t = 1)]
-    first: u64,
-}
-
-/// One family, or a group.
-#[derive(Clone)]
-struct Named(Vec<Family>);
-
-fn families(name: &str) -> Result<Named, String> {
-    let found: Vec<_> = meaning::families().filter(|family| family.name == name || family.group == name).collect();
-    let names = || meaning::families().map(|family| family.name).collect::<Vec<_>>().join(", ");
-    if found.is_empty() { Err(format!("the families are {}", names())) } else { Ok(Named(found)) }
-}
-
-impl Which {
-    fn families(&self) -> Vec<Family> {
-        let named: Vec<_> = self.families.iter().flat_map(|named| named.0.iter().copied()).collect();
-        if named.is_empty() { meaning::families().collect() } else { named }
-    }
-}
-
-#[derive(Args)]
 struct Closing {
     /// The folder of raw files, instead of this crate's `results`. Page and plots are then put there, too.
     #[arg(long, value_name = "DIR")]
@@ -248,6 +224,24 @@ struct Closing {
     /// Seconds after which a process is killed.
     #[arg(long, default_value_t = 300)]
     limit: u64,
+}
+
+#[derive(Args)]
+struct Formats {
+    /// About how many triangles the mesh has, or several meshes.
+    #[arg(long, value_delimiter = ',', default_value = "5000000")]
+    triangles: Vec<u64>,
+    /// Runs of every program over every file, in alternation.
+    #[arg(long, default_value_t = 3)]
+    runs: usize,
+    /// Memory that suture is told to use in one more run of each round, such as 512MiB.
+    #[arg(long)]
+    memory: Option<String>,
+    /// Hold that one more run of suture in a memory cgroup of so many MiB, from a cold cache (usually needs root).
+    #[arg(long, value_name = "MIB")]
+    cgroup: Option<u64>,
+    #[command(flatten)]
+    options: Closing,
 }
 
 #[derive(Args)]
@@ -268,18 +262,22 @@ impl std::str::FromStr for Peer {
     type Err = String;
 
     fn from_str(name: &str) -> Result<Self, String> {
-        let all = || Side::ALL.into_iter().filter(|side| !side.is_for_solids_alone() && !side.is_of_arrays()).collect();
-        if name == "all" { Ok(Self(all())) } else { name.parse().map(|side| Self(vec![side])) }
+        let all = || Side::ALL.into_iter().filter(|side| side.repairs_files()).collect();
+        match name.parse::<Side>() {
+            _ if name == "all" => Ok(Self(all())),
+            Ok(side) if side.is_of_formats() => Err(format!("{side} is measured by `formats`")),
+            side => side.map(|side| Self(vec![side])),
+        }
     }
 }
 
 fn main() -> ExitCode {
     let done = match Arguments::parse().task {
         Task::Generate { case, triangles, out, seed, density } => generate_file(case, density, triangles, &out, seed),
-        Task::Judge { file, solid: true, .. } => judge_solid(&file),
-        Task::Judge { file, intended: Some(intended), .. } => judge_intended(&file, &intended),
-        Task::Judge { file, skin_of: Some(before), .. } => judge_skin(&file, &before),
-        Task::Judge { file, reference, json, .. } => judge_file(&file, reference.as_deref(), json),
+        Task::Judge { file, solid: true, .. } => judging::judge_solid(&file),
+        Task::Judge { file, intended: Some(intended), .. } => judging::judge_intended(&file, &intended),
+        Task::Judge { file, skin_of: Some(before), .. } => judging::judge_skin(&file, &before),
+        Task::Judge { file, reference, json, .. } => judging::judge_file(&file, reference.as_deref(), json),
         Task::Picture(options) => picture::draw(&options).map(|()| ExitCode::SUCCESS),
         Task::Compare(choices) => compare_all(*choices),
         Task::Shape(choices) => closing(choices, "shape", false, compare::closing::shapes),
@@ -290,6 +288,8 @@ fn main() -> ExitCode {
         Task::Meaning(choices) => judge_meaning(choices),
         Task::Meant { folder, which } => write_meant(&folder, &which),
         Task::Skin { folder, jobs, keep, options } => judge_skins(&folder, jobs, keep, options),
+        Task::Formats(choices) => measure_formats(choices),
+        Task::LoadObj { file } => load_obj(&file),
         Task::Publish(Publish { results, check: true }) => check(results.as_deref()),
         Task::Publish(choices) => publish(choices.results.as_deref()).map(|()| ExitCode::SUCCESS),
     };
@@ -308,47 +308,6 @@ fn generate_file(case: Case, density: Density, triangles: u64, out: &Path, seed:
     let truth = generate::write_file_at(case, density, triangles, seed, out)?;
     println!("{:#?}\ninjected: {:#?}\nvolume: {}", truth.counts, truth.injected, truth.volume);
     Ok(ExitCode::SUCCESS)
-}
-
-fn judge_file(file: &Path, reference: Option<&Path>, json: bool) -> Result<ExitCode, Box<dyn Error>> {
-    let judgement = judge::judge(file)?;
-    if !json {
-        let yes = |good| if good { "yes" } else { "no" };
-        let Judgement { counts, .. } = judgement;
-        println!("{judgement:#?}");
-        println!("closed {}, manifold {}, oriented {}", yes(counts.closed()), yes(counts.manifold()), yes(counts.oriented()));
-    }
-    if let Some(reference) = reference {
-        let records = judge::kept_in_order(reference, file, Same::Record)?;
-        let corners = judge::kept_in_order(reference, file, Same::Corners)?;
-        if json {
-            println!("{}", serde_json::to_string(&Judged { judgement, records, corners })?);
-        } else {
-            println!("of {} records kept in order: {} whole, {} by corners", records.of, records.in_order, corners.in_order);
-        }
-    }
-    Ok(ExitCode::from(u8::from(!judgement.sound())))
-}
-
-fn judge_intended(file: &Path, intended: &Path) -> Result<ExitCode, Box<dyn Error>> {
-    let (triangles, intended) = (mesh::read(file)?, mesh::read(intended)?);
-    println!("{:#?}", judge::fidelity(&triangles, &intended));
-    println!("bodies: {}", judge::judge_triangles(&triangles).positive_bodies);
-    Ok(ExitCode::SUCCESS)
-}
-
-fn judge_skin(file: &Path, before: &Path) -> Result<ExitCode, Box<dyn Error>> {
-    println!("{:#?}", judge::skin(&mesh::read(before)?, &mesh::read(file)?));
-    Ok(ExitCode::SUCCESS)
-}
-
-fn judge_solid(file: &Path) -> Result<ExitCode, Box<dyn Error>> {
-    let found = judge::solid(file)?;
-    match found.fault() {
-        Some(fault) => println!("not printable: {} ({} triangles cross or overlap)", fault.name(), found.meeting),
-        None => println!("printable"),
-    }
-    Ok(ExitCode::from(u8::from(found.fault().is_some())))
 }
 
 /// Makes the raw file `name`, then the page.
@@ -421,6 +380,22 @@ fn judge_meaning(choices: Meaning) -> Result<ExitCode, Box<dyn Error>> {
         keep: choices.keep,
     };
     closing(choices.options, "meaning", true, |options| compare::meaning::meaning(options, &asked))
+}
+
+/// Reading and writing; the raw file is made anew.
+fn measure_formats(choices: Formats) -> Result<ExitCode, Box<dyn Error>> {
+    let asked = compare::formats::Asked {
+        sizes: choices.triangles,
+        runs: choices.runs,
+        memory: choices.memory,
+        cgroup: choices.cgroup.map(|mebibytes| mebibytes << 20),
+    };
+    closing(choices.options, "formats", false, |options| compare::formats::formats(options, &asked))
+}
+
+fn load_obj(file: &Path) -> Result<ExitCode, Box<dyn Error>> {
+    println!("{}", compare::load_obj(file)?);
+    Ok(ExitCode::SUCCESS)
 }
 
 fn write_meant(folder: &Path, which: &Which) -> Result<ExitCode, Box<dyn Error>> {

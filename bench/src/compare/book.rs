@@ -10,6 +10,7 @@ use super::made::{Closed, Shaped, Skinned, Solved, Understood};
 use super::record::{Input, Line, Outcome, Run, Session, read};
 use super::sides::Side;
 use super::statistics::Spread;
+use super::transfer::Transfer;
 use super::way::Way;
 
 /// One raw file.
@@ -53,6 +54,10 @@ impl Chapter {
 
     pub(super) fn skinned(&self) -> impl Iterator<Item = &Skinned> {
         self.lines.iter().filter_map(|line| if let Line::Skinned(skinned) = line { Some(&**skinned) } else { None })
+    }
+
+    pub(super) fn transfers(&self) -> impl Iterator<Item = &Transfer> {
+        self.lines.iter().filter_map(|line| if let Line::Transfer(transfer) = line { Some(transfer) } else { None })
     }
 
     #[cfg(test)]

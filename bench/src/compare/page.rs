@@ -9,6 +9,7 @@ use super::markdown::{self, or_dash};
 use super::page_arrays;
 use super::page_closing;
 use super::page_damage;
+use super::page_formats;
 use super::page_meaning;
 use super::page_skin;
 use super::page_solids;
@@ -50,6 +51,7 @@ pub(super) fn page(book: &Book, plots: &[(String, String)]) -> String {
     page += &page_skin::skin(book);
     page += &page_solids::solids(book);
     page += &page_arrays::arrays(book);
+    page += &page_formats::formats(book);
     for input in book.inputs() {
         page += &of_input(book, input);
     }
@@ -65,6 +67,7 @@ fn peers(book: &Book) -> String {
     for side in Side::ALL {
         let ran = book.chapters.iter().flat_map(|chapter| chapter.solved()).any(|line| line.side == side)
             || book.chapters.iter().flat_map(|chapter| chapter.understood()).any(|line| line.side == side)
+            || book.chapters.iter().flat_map(|chapter| chapter.transfers()).any(|line| line.way.side == side)
             || inputs.iter().any(|input| book.ways(input).iter().any(|way| way.side == side));
         let name = side.facts().name;
         let licence = LICENCES.iter().find(|(peer, _)| name.starts_with(peer)).map_or("", |(_, licence)| licence);

@@ -26,18 +26,20 @@ const NAMES: i32 = 190;
 /// One colour a tool, whatever the plot; blues and greens are Suture's.
 fn colour(side: Side) -> RGBColor {
     match side {
-        Side::Suture | Side::SutureOff | Side::SutureArrays | Side::Inspect => RGBColor(0, 90, 181),
+        Side::Suture | Side::SutureOff | Side::SutureArrays | Side::Inspect | Side::Convert => RGBColor(0, 90, 181),
         Side::SutureNoSi | Side::InspectNoSi => RGBColor(0, 158, 142),
         Side::Cp | Side::CpSynced => RGBColor(120, 124, 132),
         Side::PymeshlabPlain | Side::PymeshlabPlainSi => RGBColor(230, 130, 0),
-        Side::PymeshlabCompetent | Side::PymeshlabCompetentSi | Side::PymeshlabSolid | Side::PymeshlabArrays => {
-            RGBColor(200, 60, 20)
-        }
-        Side::Meshlib | Side::MeshlibDetect | Side::MeshlibSolid | Side::MeshlibArrays => RGBColor(140, 60, 170),
+        Side::PymeshlabCompetent | Side::PymeshlabCompetentSi | Side::PymeshlabSolid => RGBColor(200, 60, 20),
+        Side::PymeshlabArrays | Side::PymeshlabFormats => RGBColor(200, 60, 20),
+        Side::Meshlib | Side::MeshlibDetect | Side::MeshlibSolid => RGBColor(140, 60, 170),
+        Side::MeshlibArrays | Side::MeshlibFormats => RGBColor(140, 60, 170),
         Side::Pymeshfix | Side::PymeshfixArrays => RGBColor(190, 50, 120),
         Side::Admesh => RGBColor(110, 80, 40),
-        Side::Trimesh | Side::TrimeshArrays => RGBColor(170, 150, 30),
+        Side::Trimesh | Side::TrimeshArrays | Side::TrimeshFormats => RGBColor(170, 150, 30),
         Side::Manifold3d | Side::Manifold3dUnion => RGBColor(90, 140, 60),
+        Side::Lib3mf => RGBColor(60, 60, 70),
+        Side::Tobj => RGBColor(160, 100, 80),
     }
 }
 

@@ -6,7 +6,7 @@ use std::process::{Command, Stdio};
 
 use super::error::Error;
 use super::folders::home;
-use super::sides::{NO_SI, Program, SUTURE_PACKAGE, Side};
+use super::sides::{NO_SI, Program, SUTURE_PACKAGE, Side, TOBJ_VERSION};
 use super::way::Way;
 
 /// The programs that are there to be measured.
@@ -18,6 +18,8 @@ pub(super) struct Programs {
     /// Version by Python package.
     packages: BTreeMap<String, String>,
     admesh: Option<String>,
+    /// With its version.
+    tobj: Option<String>,
 }
 
 impl Programs {
@@ -40,6 +42,7 @@ impl Programs {
             python,
             packages,
             admesh: said(Command::new("admesh").arg("--version")).filter(|_| sides.contains(&Side::Admesh)),
+            tobj: sides.contains(&Side::Tobj).then(|| TOBJ_VERSION.into()),
         })
     }
 
@@ -55,7 +58,7 @@ impl Programs {
                 Some(_) => None,
             },
             Program::Admesh if self.admesh.is_none() => Some("admesh is not installed".into()),
-            Program::Admesh | Program::Suture | Program::Copy => None,
+            Program::Admesh | Program::Suture | Program::Convert | Program::Itself { .. } | Program::Copy => None,
         }
     }
 
@@ -86,12 +89,16 @@ impl Programs {
                     command.arg("-o").arg(output);
                 }
                 command.arg("--json").args(facts.flag);
-                if let Some(threads) = way.threads {
-                    command.arg("--threads").arg(threads.to_string());
-                }
-                if let Some(memory) = &way.memory {
-                    command.arg("--memory").arg(memory);
-                }
+                bound(&mut command, way);
+            }
+            Program::Convert => {
+                command = Command::new(self.suture.as_deref().unwrap_or(Path::new("suture")));
+                command.arg("convert").args([input, output]);
+                bound(&mut command, way);
+            }
+            Program::Itself { task } => {
+                command = Command::new(itself());
+                command.arg(task).arg(input);
             }
             Program::Python { script, .. } => {
                 command = self.script(script);
@@ -117,8 +124,9 @@ impl Programs {
                 let version = self.packages.get(package).map_or("", String::as_str);
                 (format!("{package} {version}"), home().join("pipelines").join(script))
             }
-            Program::Suture => ("suture".into(), self.suture.clone().unwrap_or_else(|| "suture".into())),
+            Program::Suture | Program::Convert => ("suture".into(), self.suture.clone().unwrap_or_else(|| "suture".into())),
             Program::Admesh => return Ok(self.admesh.clone().unwrap_or_default()),
+            Program::Itself { .. } => return Ok(self.tobj.clone().unwrap_or_default()),
             Program::Copy => return Ok("cp".into()),
         };
         let bytes = std::fs::read(&path).map_err(Error::io(format!("reading {}", path.display())))?;
@@ -136,7 +144,7 @@ impl Programs {
     pub(super) fn versions(&self) -> Vec<String> {
         let python = self.python.as_ref().and_then(|python| said(Command::new(python).arg("--version")));
         let packages = self.packages.iter().map(|(name, version)| format!("{name} {version}"));
-        python.into_iter().chain(packages).chain(self.admesh.clone()).collect()
+        python.into_iter().chain(packages).chain(self.admesh.clone()).chain(self.tobj.clone()).collect()
     }
 }
 
@@ -144,7 +152,22 @@ impl Programs {
 fn package(side: Side) -> Option<&'static str> {
     match side.facts().program {
         Program::Python { package, .. } => Some(package),
-        Program::Copy | Program::Suture | Program::Admesh => None,
+        Program::Copy | Program::Suture | Program::Convert | Program::Itself { .. } | Program::Admesh => None,
+    }
+}
+
+/// This program.
+fn itself() -> PathBuf {
+    std::env::current_exe().unwrap_or_else(|_| "suture-bench".into())
+}
+
+/// Tells suture the threads and the memory of a way.
+fn bound(command: &mut Command, way: &Way) {
+    if let Some(threads) = way.threads {
+        command.arg("--threads").arg(threads.to_string());
+    }
+    if let Some(memory) = &way.memory {
+        command.arg("--memory").arg(memory);
     }
 }
 
@@ -246,6 +269,12 @@ mod tests {
             assert!(name.is_none_or(|name| pinned.contains_key(name)), "{side:?}");
         }
         assert_eq!(pins("# a==1\nb==2.0\n\n").into_iter().collect::<Vec<_>>(), [("b".into(), "2.0".into())]);
+    }
+
+    #[test]
+    fn the_version_of_tobj_is_the_one_that_is_built() {
+        let lock = include_str!("../../../Cargo.lock").replace("name = ", "").replace("\"\nversion = \"", " ");
+        assert!(lock.contains(&format!("\"{TOBJ_VERSION}\"\n")));
     }
 
     #[test]

@@ -15,6 +15,7 @@ use super::machine::Machine;
 use super::made::{Closed, Shaped, Skinned, Solved, Understood};
 use super::sides::Side;
 use super::statistics::spaced;
+use super::transfer::Transfer;
 use super::way::Way;
 
 /// A line of a raw file.
@@ -31,6 +32,7 @@ pub(crate) enum Line {
     Solved(Box<Solved>),
     Understood(Understood),
     Skinned(Box<Skinned>),
+    Transfer(Transfer),
     /// Something was left out, and why.
     Skipped {
         side: Side,

@@ -43,6 +43,15 @@ pub(crate) enum Side {
     MeshlibArrays,
     PymeshfixArrays,
     TrimeshArrays,
+    /// `suture convert`.
+    Convert,
+    /// Libraries that read and write files of formats.
+    TrimeshFormats,
+    Lib3mf,
+    PymeshlabFormats,
+    MeshlibFormats,
+    /// The Rust crate, called by a process of this program.
+    Tobj,
 }
 
 /// Whose program it is.
@@ -51,6 +60,12 @@ pub(crate) enum Program {
     Copy,
     /// With these arguments after the task.
     Suture,
+    /// Suture's task `convert`.
+    Convert,
+    /// This program, with this task.
+    Itself {
+        task: &'static str,
+    },
     /// A script of `pipelines/` that needs a Python package.
     Python {
         script: &'static str,
@@ -253,12 +268,65 @@ const TRIMESH_ARRAYS: Facts = Facts {
     ..TRIMESH
 };
 
+const CONVERT: Facts = Facts {
+    name: "convert",
+    program: Program::Convert,
+    judged: false,
+    about: "`suture convert`, which reads the file that it wrote back and compares all corners",
+    ..SUTURE
+};
+
+const TRIMESH_FORMATS: Facts = Facts {
+    name: "trimesh-formats",
+    program: Program::Python { script: "formats.py", package: "trimesh" },
+    flag: Some("--trimesh"),
+    judged: false,
+    about: "`trimesh.load` without processing; of an STL with it, and `export`",
+    ..PLAIN
+};
+
+const LIB3MF: Facts = Facts {
+    name: "lib3mf",
+    program: Program::Python { script: "formats.py", package: "lib3mf" },
+    flag: Some("--lib3mf"),
+    about: "the 3MF Consortium's library, its readers and its writer of 3MF",
+    ..TRIMESH_FORMATS
+};
+
+const PYMESHLAB_FORMATS: Facts = Facts {
+    name: "pymeshlab-formats",
+    program: Program::Python { script: "formats.py", package: "pymeshlab" },
+    flag: Some("--pymeshlab"),
+    about: "pymeshlab: `load_new_mesh` and `save_current_mesh`, without normals of vertices",
+    ..TRIMESH_FORMATS
+};
+
+const MESHLIB_FORMATS: Facts = Facts {
+    name: "meshlib-formats",
+    program: Program::Python { script: "formats.py", package: "meshlib" },
+    flag: Some("--meshlib"),
+    about: "MeshLib: `loadMesh` and `saveMesh`",
+    ..TRIMESH_FORMATS
+};
+
+const TOBJ: Facts = Facts {
+    name: "tobj",
+    program: Program::Itself { task: "load-obj" },
+    flag: None,
+    writes: false,
+    about: "the Rust crate: `load_obj` with `triangulate`, in a process of `suture-bench`",
+    ..TRIMESH_FORMATS
+};
+
+/// tobj and its version, as `Cargo.lock` has it.
+pub(super) const TOBJ_VERSION: &str = "tobj 4.0.5";
+
 /// Arguments of pymeshlab's scripts and of suture.
 const PYMESHLAB_SI: Option<&str> = Some("--self-intersections");
 pub(super) const NO_SI: &str = "--no-self-intersections";
 
 impl Side {
-    pub(crate) const ALL: [Self; 25] = [
+    pub(crate) const ALL: [Self; 31] = [
         Self::Cp,
         Self::CpSynced,
         Self::Suture,
@@ -284,6 +352,12 @@ impl Side {
         Self::MeshlibArrays,
         Self::PymeshfixArrays,
         Self::TrimeshArrays,
+        Self::Convert,
+        Self::TrimeshFormats,
+        Self::Lib3mf,
+        Self::PymeshlabFormats,
+        Self::MeshlibFormats,
+        Self::Tobj,
     ];
 
     /// Those that are asked for a solid from any file, each with the settings that get it furthest.
@@ -302,6 +376,27 @@ impl Side {
     /// Its time is that of its work on arrays, and not that of its process.
     pub(crate) fn is_of_arrays(self) -> bool {
         Self::ARRAYS.contains(&self)
+    }
+
+    /// Those that read and write formats: Suture first.
+    pub(crate) const FORMATS: [Self; 7] = [
+        Self::InspectNoSi,
+        Self::Convert,
+        Self::TrimeshFormats,
+        Self::Lib3mf,
+        Self::PymeshlabFormats,
+        Self::MeshlibFormats,
+        Self::Tobj,
+    ];
+
+    /// Measured only where formats are read and written.
+    pub(crate) fn is_of_formats(self) -> bool {
+        Self::FORMATS.contains(&self) && self != Self::InspectNoSi
+    }
+
+    /// Measured wherever files are repaired or inspected, unless it is left out by name.
+    pub(crate) fn repairs_files(self) -> bool {
+        !self.is_for_solids_alone() && !self.is_of_arrays() && !self.is_of_formats()
     }
 
     /// Facts about it.
@@ -332,11 +427,17 @@ impl Side {
             Self::MeshlibArrays => MESHLIB_ARRAYS,
             Self::PymeshfixArrays => PYMESHFIX_ARRAYS,
             Self::TrimeshArrays => TRIMESH_ARRAYS,
+            Self::Convert => CONVERT,
+            Self::TrimeshFormats => TRIMESH_FORMATS,
+            Self::Lib3mf => LIB3MF,
+            Self::PymeshlabFormats => PYMESHLAB_FORMATS,
+            Self::MeshlibFormats => MESHLIB_FORMATS,
+            Self::Tobj => TOBJ,
         }
     }
 
     pub(crate) fn is_suture(self) -> bool {
-        self.facts().program == Program::Suture
+        matches!(self.facts().program, Program::Suture | Program::Convert)
     }
 
     /// Its output is on the disk before its time ends.
@@ -350,14 +451,17 @@ impl Side {
     }
 }
 
-/// Licences of the peers. Each is installed by the command and runs as a process of its own; no part of any is in Suture.
-pub(crate) const LICENCES: [(&str, &str); 6] = [
+/// Licences of the peers. Each runs as a process of its own, and is installed by the command (tobj is built into this program); no part of
+/// any is in Suture.
+pub(crate) const LICENCES: [(&str, &str); 8] = [
     ("pymeshlab", "GPL-3.0"),
     ("meshlib", "free for non-commercial use only"),
     ("pymeshfix", "GPL-3.0"),
     ("admesh", "GPL-2.0 or later"),
     ("trimesh", "MIT"),
     ("manifold3d", "Apache-2.0"),
+    ("lib3mf", "BSD-2-Clause"),
+    ("tobj", "MIT"),
 ];
 
 impl std::fmt::Display for Side {

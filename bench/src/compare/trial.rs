@@ -32,10 +32,10 @@ pub(super) struct Trials<'a> {
 /// The part of a report, or of a script's last line, that is looked at here.
 #[derive(Deserialize, Default)]
 #[serde(default)]
-struct Said {
-    stages: Vec<Stage>,
-    facts: std::collections::BTreeMap<String, u64>,
-    before: Option<serde_json::Value>,
+pub(super) struct Said {
+    pub(super) stages: Vec<Stage>,
+    pub(super) facts: std::collections::BTreeMap<String, u64>,
+    pub(super) before: Option<serde_json::Value>,
 }
 
 impl<'a> Trials<'a> {
@@ -197,13 +197,14 @@ fn files(path: &Path) -> Vec<PathBuf> {
     files
 }
 
-fn remove(path: &Path) -> Result<(), Error> {
+/// Removes a file, or a folder with all in it.
+pub(super) fn remove(path: &Path) -> Result<(), Error> {
     let removed = if path.is_dir() { std::fs::remove_dir_all(path) } else { std::fs::remove_file(path) };
     removed.map_err(Error::io(format!("removing {}", path.display())))
 }
 
 /// A command line with IN and OUT for the paths, and programs by their names.
-fn worded(command: &Command, input: &Path, output: &Path) -> String {
+pub(super) fn worded(command: &Command, input: &Path, output: &Path) -> String {
     let name = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let mut words = vec![name(Path::new(command.get_program()))];
     for word in command.get_args() {
@@ -224,7 +225,7 @@ fn worded(command: &Command, input: &Path, output: &Path) -> String {
 }
 
 /// What a program says of itself: its stages summed over all files, in the order of their first appearance.
-fn listen(text: &str) -> Said {
+pub(super) fn listen(text: &str) -> Said {
     let mut all = Said::default();
     for said in text.lines().filter_map(|line| serde_json::from_str::<Said>(line).ok()) {
         for stage in said.stages {

@@ -22,8 +22,7 @@ them. A peer that is faster than Suture, or that holds less resident memory, is 
 * **Writing.** The seconds are those of whole processes, from the STL to the synced file. `suture convert` also reads that file back, and compares all
   corners with the STL's. A peer's script imports its library, loads the STL, where vertices of equal position become one, and saves.
 * **Left out.** trimesh, pymeshlab and MeshLib know no AMF, lib3mf knows 3MF alone, and tobj reads OBJ alone. trimesh is given no 3MF beyond 1 M
-  triangles: one of 5 M takes it about a minute and 8 GB. MeshLib reads a 3MF as a scene alone, and refuses an OFF with a comment before its counts, which
-  Suture's files have.
+  triangles: one of 5 M takes it about a minute and 8 GB. MeshLib reads a 3MF as a scene alone.
 ";
 
 /// The section; nothing if nothing was measured.

@@ -73,8 +73,8 @@ impl Format {
             }
             (Side::Lib3mf, _) => self == Self::ThreeMf,
             (Side::PymeshlabFormats, _) | (Side::MeshlibFormats, Direction::Write) => self != Self::Amf,
-            // It reads a 3MF as a scene alone, and refuses an OFF with a comment before its counts, which Suture writes.
-            (Side::MeshlibFormats, Direction::Read) => matches!(self, Self::Ply | Self::Obj),
+            // It reads a 3MF as a scene alone.
+            (Side::MeshlibFormats, Direction::Read) => matches!(self, Self::Ply | Self::Off | Self::Obj),
             (Side::Tobj, Direction::Read) => self == Self::Obj,
             _ => false,
         };

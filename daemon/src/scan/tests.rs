@@ -153,13 +153,15 @@ struct Watched {
     r: Reconciler,
     start: Instant,
     jobs: u64,
+    /// Names that have had a job.
+    known: BTreeSet<PathBuf>,
 }
 
 impl Watched {
     fn new() -> Self {
         let dir = tempfile::tempdir().unwrap();
         let r = reconciler(dir.path());
-        Self { dir, r, start: Instant::now(), jobs: 0 }
+        Self { dir, r, start: Instant::now(), jobs: 0, known: BTreeSet::new() }
     }
 
     fn put(&self, name: &str, text: &str) {
@@ -176,7 +178,8 @@ impl Watched {
             self.r.scan(now).unwrap();
             for (path, submission) in self.r.look(now) {
                 self.jobs += 1;
-                self.r.submitted(&path, &submission, new(self.jobs));
+                let answer = Submitted { new: self.known.insert(path.clone()), ..new(self.jobs) };
+                self.r.submitted(&path, &submission, answer);
                 names.push(format!("{}{}", if submission.foreign.is_some() { "?" } else { "" }, path.display()));
             }
         }
@@ -283,7 +286,7 @@ fn an_obj_that_is_done_and_stays_waits_for_nothing() {
     let config = FolderConfig { name: "hot".into(), leave_originals: true, ..FolderConfig::of(dir.path()) };
     let folder = Arc::new(Folder::open(&config, None).unwrap());
     let r = Reconciler::new(Arc::clone(&folder), Arc::new(settings), Rest { settle: Duration::from_secs(1) });
-    let mut w = Watched { dir, r, start: Instant::now(), jobs: 0 };
+    let mut w = Watched { dir, r, start: Instant::now(), jobs: 0, known: BTreeSet::new() };
     w.put("part.obj", OBJ);
     assert_eq!(w.taken(0..=7), ["part.obj"]);
     w.r.ended(Path::new("part.obj"));

@@ -72,7 +72,9 @@ fn an_obj_its_library_and_its_texture_come_in_any_order() {
         }
         let result = place.read("hot/out/part.obj");
         assert!(result.starts_with(b"mtllib part.mtl\n"));
-        assert!(judge_triangles(&forms::read("obj", &result)).sound());
+        let text = String::from_utf8(result).unwrap();
+        let mesh: String = text.lines().filter(|row| row.starts_with(['v', 'f'])).map(|row| format!("{row}\n")).collect();
+        assert!(judge_triangles(&forms::read("obj", mesh.as_bytes())).sound());
     };
     std::thread::scope(|scope| {
         for order in [[0, 1, 2], [1, 2, 0], [2, 0, 1]] {

@@ -16,6 +16,7 @@ use suture_store::Lease;
 use suture_store::job::{Duty, Kind, Withdrawal};
 use suture_store::{Claim, Job, JobId, JobStore, State, Step, StoreError, crash_point};
 
+use crate::carry::is_carried;
 use crate::choice;
 use crate::claim::{CLAIMED, Claimed, Unclaimed, claim};
 use crate::config::Config;
@@ -37,6 +38,7 @@ use crate::settings::Settings;
 use crate::supervise::{Cause, Ended};
 use crate::world::World;
 
+mod carry;
 mod staff;
 mod worked;
 
@@ -299,6 +301,16 @@ impl Slot {
             Err(Unclaimed::Withdrawn(why)) => Step::Withdrawn(why),
             Err(Unclaimed::Environment(reason)) => Step::Environment { reason },
             Err(Unclaimed::Shortage(reason)) => Step::Wait { reason },
+            Ok(claimed) if is_carried(&job.source.path) => {
+                crash_point("daemon.linked");
+                match self.carry(folder, token, &claimed) {
+                    Ok(content) => {
+                        let desk = Desk::new(&*context.store, folder, token, &self.committed);
+                        return desk.intend_carried(job, content, claimed.ctime_ns()).map(Some);
+                    }
+                    Err(step) => *step,
+                }
+            }
             Ok(claimed) => {
                 crash_point("daemon.linked");
                 let desk = Desk::new(&*context.store, folder, token, &self.committed);

@@ -209,6 +209,10 @@ fn log_moved(job: &Job, step: &Step) {
         State::Ended { publication } if publication.ending == Ending::Skipped => {
             tracing::info!(ending = ?publication.ending, reason = publication.reason, "Skipped.");
         }
+        State::Ended { publication } if publication.ending == Ending::Carried => {
+            let output = publication.output.as_ref().map(tracing::field::display);
+            tracing::info!(ending = ?publication.ending, output, reason = publication.reason, "Carried along with a mesh.");
+        }
         State::Ended { publication } if publication.ending.is_good() => {
             let output = publication.output.as_ref().map(tracing::field::display);
             tracing::info!(ending = ?publication.ending, output, reused = publication.reused.map(|job| job.0), "Done.");
@@ -251,6 +255,7 @@ fn count_ended(metrics: &Metrics, job: &Job, publication: &Publication) {
         _ if publication.reused.is_some() => "reused",
         Ending::Clean => "ok",
         Ending::Skipped => "skipped",
+        Ending::Carried => "carried",
         Ending::Repaired => "repaired",
         Ending::NeedsReview => "needs_review",
         Ending::Quarantined => "quarantined",
@@ -258,7 +263,9 @@ fn count_ended(metrics: &Metrics, job: &Job, publication: &Publication) {
     };
     let (folder, profile) = (job.source.folder.as_str(), job.source.profile.as_str());
     metrics.add(Count::JobsFinished, &[("folder", folder), ("profile", profile), ("result", result)], 1);
-    metrics.add(Count::InputBytes, &[], job.source.size);
+    if publication.ending != Ending::Carried {
+        metrics.add(Count::InputBytes, &[], job.source.size);
+    }
 }
 
 fn count_parcel(metrics: &Metrics, parcel: &Parcel<'_>, result: &str) {

@@ -228,7 +228,7 @@ impl Keeper {
             if let Some(kept) = self.folders.iter_mut().find(|kept| kept.folder.name == job.source.folder)
                 && job.original().0 == Area::In
             {
-                kept.reconciler.known(&job.source, job.id);
+                kept.reconciler.known(&job.source, job.id, Some(job.priority));
             }
         }
         Ok(())
@@ -338,7 +338,7 @@ impl Kept {
         if job.source.folder == self.folder.name {
             self.orders.remember(job, now);
             if job.kind().is_at_rest() && job.answers_for_source() {
-                self.reconciler.known(&job.source, job.id);
+                self.reconciler.known(&job.source, job.id, None);
             }
         }
     }
@@ -389,8 +389,13 @@ impl Kept {
 
     /// It was looked at from `now` on; `away` of it is out of reach.
     fn looked_at(&self, context: &Context, now: Instant, away: Vec<String>) {
-        context.away.lock().unwrap_or_else(PoisonError::into_inner).insert(self.folder.name.clone(), away);
+        self.show_away(context, away);
         context.pulse.scanned(&self.folder.name, context.world.steady().duration_since(now));
+    }
+
+    /// `away` of it is out of reach, or waits.
+    fn show_away(&self, context: &Context, away: Vec<String>) {
+        context.away.lock().unwrap_or_else(PoisonError::into_inner).insert(self.folder.name.clone(), away);
     }
 
     fn unreadable(&self, error: &io::Error) -> String {
@@ -439,6 +444,9 @@ impl Kept {
         }
         self.looked = now;
         let ready = self.reconciler.look(now);
+        if self.reconciler.have_waits_changed() {
+            self.show_away(context, self.reconciler.left_out());
+        }
         if ready.is_empty() { Ok(()) } else { self.submit(context, now, ready) }
     }
 
@@ -450,7 +458,7 @@ impl Kept {
                 crash_point("daemon.submitted");
                 for ((path, submission), answer) in paths.iter().zip(&found).zip(submitted) {
                     self.orders.came(&submission.source.path, answer.id, now);
-                    self.reconciler.submitted(path, submission, answer.id);
+                    self.reconciler.submitted(path, submission, answer);
                 }
             }
             Err(StoreError::TooLong { .. }) => {
@@ -460,7 +468,7 @@ impl Kept {
                         Ok(answer) => {
                             for answer in answer {
                                 self.orders.came(&submission.source.path, answer.id, now);
-                                self.reconciler.submitted(path, submission, answer.id);
+                                self.reconciler.submitted(path, submission, answer);
                             }
                         }
                         Err(error) if error.is_callers() => self.reconciler.refused(path, &error.to_string()),

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use suture_store::job::Area;
-use suture_store::{Job, Publication, State};
+use suture_store::{Ending, Job, Publication, State};
 
 use crate::receipt::REPORT;
 
@@ -41,7 +41,15 @@ pub(crate) fn report_path(dir: &Path, job: &Job) -> Option<PathBuf> {
     report_of(dir, publication)
 }
 
+/// Is there a report? Of a file that was carried nothing was judged.
+pub(crate) fn has_report(publication: &Publication) -> bool {
+    publication.ending != Ending::Carried
+}
+
 fn report_of(dir: &Path, publication: &Publication) -> Option<PathBuf> {
+    if !has_report(publication) {
+        return None;
+    }
     let folder = if publication.ending.is_good() { "out" } else { area(publication.ending.area()) };
     let mut name = dir.join(folder).join(publication.base()?.to_path()).into_os_string();
     name.push(REPORT);

@@ -22,6 +22,7 @@ use crate::claim::{CLAIMED, Original, is_source};
 use crate::create;
 use crate::folder::{Folder, make_parent};
 use crate::fsx::{self, Identity};
+use crate::left::has_report;
 use crate::names::{VERSIONS, ending_of_name, first, no_free_name, with_suffix};
 use crate::place::{Item, Move, Placed, stage};
 use crate::publish_error::{PublishError, io_at};
@@ -282,6 +283,9 @@ impl<'a> Desk<'a> {
         for path in &names {
             match fsx::look(path).map_err(io_at(path))?.filter(is_original) {
                 Some(found) if found.ctime_ns == ctime => return Ok(true),
+                Some(found) if p.ending == Ending::Carried => {
+                    return Ok(is_source(&found, job) && Some(fsx::hash(path).map_err(io_at(path))?) == p.output_hash);
+                }
                 Some(found) => return Ok(is_source(&found, job) && self.is_made_of(job, path)?),
                 None => {}
             }
@@ -320,6 +324,9 @@ impl<'a> Desk<'a> {
     /// Someone took the name of the intent: another one, said in a new intent, or no result where the folder wants no second one. Report and
     /// receipt are written anew, since they name it. What a person approved is published in any case.
     fn choose_again(&self, job: &Job, old: &Publication) -> Result<Job, PublishError> {
+        if let (Ending::Carried, Some(content)) = (old.ending, old.output_hash) {
+            return self.choose_again_carried(job, old, content);
+        }
         let ending = old.output.as_ref().map(ending_of_name);
         if old.ending.is_good()
             && old.output.is_some()
@@ -428,7 +435,7 @@ fn pieces(folder: &Folder, job: &Job, p: &Publication) -> Vec<Piece> {
     let output = output.map(|path| piece(OUTPUT, area.join(path.to_path()), p.output_hash, "daemon.output_placed"));
     let report = piece(REPORT_FILE, beside(REPORT), p.report_hash, "daemon.report_placed");
     let receipt = piece(RECEIPT_FILE, beside(RECEIPT), None, "daemon.receipt_placed");
-    output.into_iter().chain([report, receipt]).collect()
+    output.into_iter().chain(Some(report).filter(|_| has_report(p))).chain([receipt]).collect()
 }
 
 /// Removes what `job`, as it was before it was given up, had ready beside its places. There is any only where the result was to cross
@@ -470,5 +477,6 @@ fn rewrite<T: Serialize>(path: &Path, value: &T) -> Result<Hash, PublishError> {
 
 pub(crate) mod approved;
 mod called;
+mod carried;
 #[cfg(test)]
 pub(crate) mod tests;

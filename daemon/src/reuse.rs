@@ -132,7 +132,10 @@ fn read_report(path: &Path, hash: Hash) -> io::Result<Option<Report>> {
 }
 
 /// BLAKE3 of a file's bytes; an error of kind `Interrupted` as soon as `stop` says so.
-fn hash_unless(path: &Path, stop: &dyn Fn() -> bool) -> io::Result<Hash> {
+///
+/// # Errors
+/// As `open` and `read`.
+pub(crate) fn hash_unless(path: &Path, stop: &dyn Fn() -> bool) -> io::Result<Hash> {
     let mut hasher = blake3::Hasher::new();
     let mut file = File::open(path)?;
     let mut buffer = vec![0; 1 << 20];

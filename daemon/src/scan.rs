@@ -1,19 +1,20 @@
 //! The reconciler of one hot folder: it compares what lies in `in/` with what is known of it. Reading the folder is the only
 //! truth; a hint from the system only makes it happen sooner (and says that a name was renamed into place).
+//!
+//! An OBJ is not whole without the files that it names ([`companions`]): it waits for them, as long as a file waits whose length does not fit. They
+//! go along with it, as jobs of their own ([`crate::carry`]); what no OBJ in `in/` names is noticed, and left where it is.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::fs::{FileType, Metadata};
 use std::io;
-use std::os::unix::fs::FileTypeExt;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 
-use suture_store::{JobId, RelPath, Source, Submission};
+use suture_store::{JobId, Priority, RelPath, Source, Submission, Submitted};
 
 use crate::choice;
 use crate::claim::Original;
-use crate::folder::{Folder, NameKind, endings, is_hot, name_kind};
+use crate::folder::Folder;
 use crate::force;
 use crate::fsx::{self, Identity};
 use crate::handed::{Handed, Untaken};
@@ -22,22 +23,40 @@ use crate::settings::Settings;
 use crate::settle::{Look, Rest, Settling};
 use crate::whole::is_whole;
 use crate::writers::Writers;
+use companions::is_obj;
+use complete::complete;
+use found::{DEPTH, Found};
+use references::References;
 
-/// Sub-folders are searched to this depth: more than a path that a record can hold has room for in practice.
-const DEPTH: usize = 64;
+mod companions;
+mod complete;
+mod found;
+mod references;
 
 /// So many names that cannot be taken are told of.
 const LEFT_OUT: usize = 20;
+
+/// So many companions that a file lacks are named.
+const NAMED: usize = 5;
 
 /// What is known of one name in `in/`.
 #[derive(Debug)]
 enum Entry {
     /// Being watched until it rests. `foreign`: what it is, when it is no mesh.
-    Settling { state: Settling, foreign: Option<String> },
-    /// A job answers for it.
-    Submitted { id: JobId, identity: Identity, foreign: bool },
+    /// `lacks`: companions that it has waited for so long that people should know.
+    Settling { state: Settling, foreign: Option<String>, lacks: Vec<PathBuf> },
+    /// A job answers for it. `leads`: it is an OBJ whose job has not ended, wanted this soon.
+    Submitted { id: JobId, identity: Identity, foreign: bool, leads: Option<Priority> },
     /// It cannot become a job, for this reason; said once in the log.
     Unrecordable { identity: Identity, reason: String },
+}
+
+/// A file that is at rest.
+struct Resting {
+    identity: Identity,
+    foreign: Option<String>,
+    /// It may still wait for its companions.
+    is_patient: bool,
 }
 
 /// Looks after one hot folder's `in/`.
@@ -51,19 +70,37 @@ pub(crate) struct Reconciler {
     warned: BTreeSet<String>,
     /// Sub-folders that could not be read, and why: what is in them is not gone.
     unreadable: BTreeMap<PathBuf, String>,
+    references: References,
+    /// OBJs whose jobs have ended, and whose originals stay: they wait for nothing any more.
+    over: BTreeMap<PathBuf, Identity>,
+    /// Who waits for companions is another one than at the last look.
+    waits_changed: bool,
 }
 
 impl Reconciler {
     pub(crate) fn new(folder: Arc<Folder>, settings: Arc<Settings>, rest: Rest) -> Self {
-        Self { folder, settings, rest, entries: BTreeMap::new(), warned: BTreeSet::new(), unreadable: BTreeMap::new() }
+        Self {
+            folder,
+            settings,
+            rest,
+            entries: BTreeMap::new(),
+            warned: BTreeSet::new(),
+            unreadable: BTreeMap::new(),
+            references: References::default(),
+            over: BTreeMap::new(),
+            waits_changed: false,
+        }
     }
 
     /// A job of an earlier life answers for this file already: it need not settle again, and when the job ends while the folder
-    /// is being read, it is not taken for a new drop.
-    pub(crate) fn known(&mut self, source: &Source, id: JobId) {
+    /// is being read, it is not taken for a new drop. `live`: how soon a job is wanted that has not ended.
+    pub(crate) fn known(&mut self, source: &Source, id: JobId, live: Option<Priority>) {
         let Source { dev, ino, size, mtime_ns, .. } = *source;
         let identity = Identity { dev, ino, size, mtime_ns, ctime_ns: 0 };
-        self.entries.insert(source.path.to_path(), Entry::Submitted { id, identity, foreign: false });
+        let path = source.path.to_path();
+        let leads = live.filter(|_| is_obj(&path));
+        self.waits_changed = true;
+        self.entries.insert(path, Entry::Submitted { id, identity, foreign: false, leads });
     }
 
     /// Reads the folder. Files that are new or changed begin to settle; names that are gone are forgotten, and the jobs of
@@ -89,6 +126,7 @@ impl Reconciler {
             }
             stays
         });
+        self.over.retain(|path, _| found.contains_key(path));
         for (path, (identity, foreign)) in found {
             let known = match self.entries.get(&path) {
                 // Its identity is looked at where it settles.
@@ -100,9 +138,10 @@ impl Reconciler {
                 None => false,
             };
             if !known {
-                self.entries.insert(path, Entry::Settling { state: Settling::new(identity, now), foreign });
+                self.entries.insert(path, Entry::Settling { state: Settling::new(identity, now), foreign, lacks: Vec::new() });
             }
         }
+        self.references.keep(|obj| self.entries.contains_key(obj));
         Ok(gone)
     }
 
@@ -118,17 +157,53 @@ impl Reconciler {
         }
     }
 
-    /// Looks at everything that is settling; returns what has come to rest.
+    /// Looks at everything that is settling; returns what has come to rest, and files that an OBJ has come to name since they were noticed.
     pub(crate) fn look(&mut self, now: Instant) -> Vec<(PathBuf, Submission)> {
-        let inbox = self.folder.inbox();
+        let resting = self.resting(now);
+        let named = self.named(&resting);
         let mut ready = Vec::new();
+        for (path, Resting { identity, foreign, is_patient }) in &resting {
+            let companion = named.get(path).filter(|_| foreign.is_some()).copied();
+            let waits = is_obj(path) && foreign.is_none() && self.waits(path, identity, *is_patient, &resting, now);
+            if !waits {
+                let foreign = foreign.clone().filter(|_| companion.is_none());
+                ready.push((path.clone(), *identity, foreign, companion));
+            }
+        }
+        let noticed = named.iter().filter_map(|(path, priority)| match self.entries.get(path) {
+            Some(Entry::Submitted { identity, foreign: true, .. }) => Some((path.clone(), *identity, None, Some(*priority))),
+            _ => None,
+        });
+        ready.extend(noticed);
+        // An OBJ comes to its end when what it names is beside its result, as far as that is up to the order.
+        ready.sort_by_key(|(.., companion)| companion.is_none());
+        let mut submissions = Vec::new();
+        for (path, identity, foreign, companion) in ready {
+            match RelPath::from_path(&path) {
+                Ok(name) => {
+                    let source = self.source(name, &identity);
+                    let own = || choice::priority(&self.settings.now(), &self.folder, &source.path, &source.profile);
+                    let priority = companion.unwrap_or_else(own);
+                    submissions.push((path, Submission { source, foreign, priority }));
+                }
+                Err(error) => self.give_up(&path, identity, &error.to_string()),
+            }
+        }
+        submissions
+    }
+
+    /// What is at rest of all that is settling.
+    fn resting(&mut self, now: Instant) -> BTreeMap<PathBuf, Resting> {
+        let inbox = self.folder.inbox();
+        let mut resting = BTreeMap::new();
         let mut writers = Writers::default();
         for (path, entry) in &mut self.entries {
-            let Entry::Settling { state, foreign } = entry else { continue };
+            let Entry::Settling { state, foreign, lacks } = entry else { continue };
             let full = inbox.join(path);
             // A name that is gone is the next scan's business.
             let Ok(identity) = Identity::of(&full) else { continue };
-            let rests = match state.look(identity, now, self.rest) {
+            let look = state.look(identity, now, self.rest);
+            let rests = match look {
                 Look::Wait => false,
                 Look::IfLengthFits => {
                     foreign.is_some() || Original::open(&full).and_then(|file| is_whole(file.file())).unwrap_or(false)
@@ -141,32 +216,133 @@ impl Reconciler {
                 tracing::warn!(folder = %self.folder.name, file = %path.display(), "A program keeps the file open for writing; it waits.");
             }
             if rests && !written {
-                ready.push((path.clone(), *state.identity(), foreign.clone()));
+                let is_patient = look == Look::IfLengthFits;
+                resting.insert(path.clone(), Resting { identity: *state.identity(), foreign: foreign.clone(), is_patient });
+            } else if !lacks.is_empty() {
+                lacks.clear();
+                self.waits_changed = true;
             }
         }
-        let mut submissions = Vec::new();
-        for (path, identity, foreign) in ready {
-            match RelPath::from_path(&path) {
-                Ok(name) => {
-                    let source = self.source(name, &identity);
-                    let priority = choice::priority(&self.settings.now(), &self.folder, &source.path, &source.profile);
-                    submissions.push((path, Submission { source, foreign, priority }));
-                }
-                Err(error) => self.give_up(&path, identity, &error.to_string()),
-            }
-        }
-        submissions
+        resting
     }
 
-    /// A job answers for a file now. `new`: it was not known before.
-    pub(crate) fn submitted(&mut self, path: &Path, submission: &Submission, id: JobId) {
-        if let Some(entry) = self.entries.get_mut(path)
-            && let Entry::Settling { state, foreign } = entry
-        {
-            let identity = *state.identity();
-            if identity.size == submission.source.size && identity.mtime_ns == submission.source.mtime_ns {
-                *entry = Entry::Submitted { id, identity, foreign: foreign.is_some() };
+    /// Files in `in/` that OBJs there name, and how soon the most urgent of these is wanted. Nothing, where that is known and no file waits for it.
+    fn named(&mut self, resting: &BTreeMap<PathBuf, Resting>) -> BTreeMap<PathBuf, Priority> {
+        let leaders = self.leaders(resting);
+        let is_new = |(obj, identity, _): &(PathBuf, Identity, Priority)| {
+            resting.contains_key(obj) || !self.references.knows(obj, identity)
+        };
+        let mut named = BTreeMap::new();
+        if !resting.values().any(|file| file.foreign.is_some()) && !leaders.iter().any(is_new) {
+            return named;
+        }
+        let inbox = self.folder.inbox();
+        let (entries, references) = (&self.entries, &mut self.references);
+        let is_file = |path: &Path| std::fs::symlink_metadata(inbox.join(path)).is_ok_and(|meta| meta.is_file());
+        let find = |path: &Path| match entries.get(path) {
+            Some(Entry::Settling { state, .. }) => Some(*state.identity()),
+            Some(Entry::Submitted { identity, .. }) => Some(*identity),
+            _ => None,
+        };
+        for (obj, identity, priority) in leaders {
+            references.read(&inbox, &obj, &identity, &find);
+            for name in references.of(&obj).filter(|name| entries.contains_key(*name) && is_file(name)) {
+                let known = named.entry(name.to_owned()).or_insert(priority);
+                *known = priority.max(*known);
             }
+        }
+        let has_job = |path: &Path| matches!(entries.get(path), Some(Entry::Submitted { .. }));
+        for path in named.keys().filter(|path| resting.contains_key(*path) || has_job(path)) {
+            references.goes_along(path);
+        }
+        named
+    }
+
+    /// OBJs that may have companions: those in work or in line, those at rest, and, where a file waits for it, those on their way.
+    fn leaders(&mut self, resting: &BTreeMap<PathBuf, Resting>) -> Vec<(PathBuf, Identity, Priority)> {
+        let all = resting.values().any(|file| file.foreign.is_some());
+        let (mut leaders, mut settling) = (Vec::new(), Vec::new());
+        for (path, entry) in self.entries.iter().filter(|(path, _)| is_obj(path)) {
+            match entry {
+                Entry::Submitted { identity, leads: Some(priority), .. } => leaders.push((path.clone(), *identity, *priority)),
+                Entry::Settling { state, foreign: None, .. } if all || resting.contains_key(path) => {
+                    settling.push((path.clone(), *state.identity()));
+                }
+                _ => {}
+            }
+        }
+        for (path, identity) in settling.into_iter().filter(|(path, identity)| !self.is_over(path, identity)).collect::<Vec<_>>()
+        {
+            if let Ok(name) = RelPath::from_path(&path) {
+                let profile = self.profile_name(&name);
+                let priority = choice::priority(&self.settings.now(), &self.folder, &name, &profile);
+                leaders.push((path, identity, priority));
+            }
+        }
+        leaders
+    }
+
+    fn is_over(&self, obj: &Path, identity: &Identity) -> bool {
+        self.over.get(obj).is_some_and(|over| over.same_but_for_device(identity))
+    }
+
+    /// Has an OBJ at rest still to wait for files that it names? When its patience is over, those that did not come are named.
+    fn waits(
+        &mut self,
+        obj: &Path,
+        identity: &Identity,
+        is_patient: bool,
+        resting: &BTreeMap<PathBuf, Resting>,
+        now: Instant,
+    ) -> bool {
+        if self.is_over(obj, identity) {
+            return false;
+        }
+        let is_at_hand = |name: &Path| match self.entries.get(name) {
+            Some(Entry::Settling { .. }) => resting.contains_key(name),
+            Some(_) => true,
+            None => self.references.has_gone_along(name),
+        };
+        let missing: Vec<PathBuf> = self.references.of(obj).filter(|name| !is_at_hand(name)).map(Path::to_owned).collect();
+        if !is_patient {
+            let out = self.folder.out();
+            let is_nowhere = |name: &&PathBuf| fsx::exists(&out.join(force::without(name))).is_ok_and(|there| !there);
+            let nowhere: Vec<&PathBuf> = missing.iter().filter(is_nowhere).collect();
+            if !nowhere.is_empty() {
+                let (folder, file, missing) = (&self.folder.name, obj.display(), few(&nowhere));
+                tracing::warn!(folder, %file, missing, "A file is taken without files that it names: they did not come.");
+            }
+        }
+        let waits = is_patient && !missing.is_empty();
+        if let Some(Entry::Settling { state, lacks, .. }) = self.entries.get_mut(obj) {
+            let is_long = state.rested(now) >= self.rest.settle * 2;
+            let shown = if waits && is_long { missing } else { Vec::new() };
+            self.waits_changed |= *lacks != shown;
+            *lacks = shown;
+        }
+        waits
+    }
+
+    /// Who waits for companions, as [`Reconciler::left_out`] tells it, has it changed since this was asked?
+    pub(crate) fn have_waits_changed(&mut self) -> bool {
+        std::mem::take(&mut self.waits_changed)
+    }
+
+    /// A job answers for a file now.
+    pub(crate) fn submitted(&mut self, path: &Path, submission: &Submission, answer: Submitted) {
+        let Some(entry) = self.entries.get_mut(path) else { return };
+        match entry {
+            Entry::Settling { state, lacks, .. } => {
+                let identity = *state.identity();
+                self.waits_changed |= !lacks.is_empty();
+                if identity.size == submission.source.size && identity.mtime_ns == submission.source.mtime_ns {
+                    let foreign = submission.foreign.is_some();
+                    let leads = (answer.new && !foreign && is_obj(path)).then_some(submission.priority);
+                    *entry = Entry::Submitted { id: answer.id, identity, foreign, leads };
+                }
+            }
+            Entry::Submitted { foreign, .. } if submission.foreign.is_none() => *foreign = false,
+            _ => {}
         }
     }
 
@@ -211,7 +387,14 @@ impl Reconciler {
 
     /// A job ended: should its name be seen again, it is a new drop.
     pub(crate) fn ended(&mut self, path: &Path) {
-        self.entries.remove(path);
+        let ended = self.entries.remove(path);
+        if !is_obj(path) {
+            return;
+        }
+        if let (Some(Entry::Submitted { identity, .. }), true) = (ended, self.folder.leave_originals) {
+            self.over.insert(path.to_owned(), identity);
+        }
+        self.references.keep(|obj| self.entries.contains_key(obj));
     }
 
     /// Is anything on its way to rest?
@@ -226,6 +409,9 @@ impl Reconciler {
         let folders = self.unreadable.iter().map(|(path, reason)| line(path, reason));
         let files = self.entries.iter().filter_map(|(path, entry)| match entry {
             Entry::Unrecordable { reason, .. } => Some(line(path, reason)),
+            Entry::Settling { lacks, .. } if !lacks.is_empty() => {
+                Some(line(path, &format!("it waits for files that it names: {}", few(lacks))))
+            }
             Entry::Settling { state, .. } if state.was_told() => Some(line(path, "a program keeps it open for writing")),
             _ => None,
         });
@@ -268,104 +454,13 @@ impl Reconciler {
     }
 }
 
-/// A mesh below `in/` to which nothing is added any more.
-fn complete(inbox: &Path, below: &Path) -> Result<Identity, Untaken> {
-    let unseen = |error: io::Error| Untaken::Unavailable(format!("the file cannot be looked at: {error}"));
-    let name = below.file_name().unwrap_or_default();
-    // A file that the scan would not find is not there: no link is followed on the way.
-    for folder in below.ancestors().skip(1).filter(|folder| !folder.as_os_str().is_empty()) {
-        let found = fsx::look(&inbox.join(folder)).map_err(unseen)?;
-        let is_folder = found.is_some() && std::fs::symlink_metadata(inbox.join(folder)).is_ok_and(|meta| meta.is_dir());
-        let hidden = folder.file_name().is_some_and(|name| name_kind(name) == NameKind::Ignored);
-        if !is_folder || hidden || is_hot(&inbox.join(folder)).map_err(unseen)? {
-            return Err(Untaken::Missing);
-        }
+/// The first of these names, and how many more there are.
+fn few<P: AsRef<Path>>(names: &[P]) -> String {
+    let mut words: Vec<_> = names.iter().take(NAMED).map(|name| name.as_ref().display().to_string()).collect();
+    if names.len() > NAMED {
+        words.push(format!("and {} more", names.len() - NAMED));
     }
-    let full = inbox.join(below);
-    if fsx::look(&full).map_err(unseen)?.is_none() {
-        return Err(Untaken::Missing);
-    }
-    let meta = std::fs::symlink_metadata(&full).map_err(unseen)?;
-    let kind = name_kind(name);
-    let else_it_is = || if meta.is_dir() { Some("a folder".into()) } else { what_else(&meta, kind, &name.to_string_lossy()) };
-    match (kind, else_it_is()) {
-        (NameKind::Ignored, _) => return Err(Untaken::NoMesh("a temporary or hidden file, which is not taken".into())),
-        (_, Some(words)) => return Err(Untaken::NoMesh(words)),
-        (_, None) => {}
-    }
-    let file = Original::open(&full).map_err(unseen)?;
-    let identity = file.identity().map_err(unseen)?;
-    let whole = is_whole(file.file()).map_err(unseen)? && !Writers::default().has(file.file(), &identity);
-    if whole { Ok(identity) } else { Err(Untaken::Unfinished) }
-}
-
-/// What lies in a folder.
-#[derive(Default)]
-struct Found {
-    /// Everything that is neither a folder nor temporary; what is no regular mesh file comes with words for what it is.
-    files: BTreeMap<PathBuf, (Identity, Option<String>)>,
-    /// Sub-folders that cannot be read, and why.
-    unreadable: BTreeMap<PathBuf, String>,
-}
-
-impl Found {
-    fn walk(&mut self, root: &Path, below: &Path, depth: usize) -> io::Result<()> {
-        for entry in std::fs::read_dir(root.join(below))? {
-            // A folder that is read half is not read.
-            let entry = entry?;
-            let name = entry.file_name();
-            let kind = name_kind(&name);
-            if kind == NameKind::Ignored {
-                continue;
-            }
-            // Not followed, if it is a link.
-            let meta = match entry.metadata() {
-                Ok(meta) => meta,
-                // Gone between the two calls: not there.
-                Err(error) if error.kind() == io::ErrorKind::NotFound => continue,
-                Err(error) => return Err(error),
-            };
-            let path = below.join(&name);
-            if meta.is_dir() {
-                // Someone else's files.
-                // A sub-folder that cannot be read does not hide the others.
-                let walked = match is_hot(&root.join(&path)) {
-                    Ok(true) => Err("it is a hot folder of its own".into()),
-                    Ok(false) if depth == 0 => Err(format!("it lies deeper than {DEPTH} folders")),
-                    Ok(false) => self.walk(root, &path, depth - 1).map_err(|error| error.to_string()),
-                    Err(error) => Err(error.to_string()),
-                };
-                if let Err(why) = walked {
-                    self.unreadable.insert(path, why);
-                }
-                continue;
-            }
-            self.files.insert(path, (Identity::from(&meta), what_else(&meta, kind, &name.to_string_lossy())));
-        }
-        Ok(())
-    }
-}
-
-/// Words for what is no mesh.
-fn what_else(meta: &Metadata, kind: NameKind, name: &str) -> Option<String> {
-    let special = |t: FileType| {
-        let words = [
-            (t.is_symlink(), "a symbolic link, which is not followed"),
-            (t.is_fifo(), "a pipe"),
-            (t.is_socket(), "a socket"),
-            (t.is_block_device() || t.is_char_device(), "a device"),
-        ];
-        words.iter().find(|(is, _)| *is).map(|(_, words)| (*words).to_owned())
-    };
-    if let Some(words) = special(meta.file_type()) {
-        return Some(words);
-    }
-    (kind == NameKind::Foreign).then(|| match name.rsplit_once('.') {
-        Some((_, extension)) => {
-            format!("a .{} file, which is not read; meshes end in {}", extension.to_ascii_lowercase(), endings())
-        }
-        None => format!("a file of unknown format; meshes end in {}", endings()),
-    })
+    words.join(", ")
 }
 
 #[cfg(test)]

@@ -77,6 +77,11 @@ impl Settling {
         &self.identity
     }
 
+    /// How long nothing about it has changed.
+    pub(crate) fn rested(&self, now: Instant) -> Duration {
+        now.duration_since(self.since)
+    }
+
     /// Has it been at rest, but for a program that has it open for writing, for so long that people should know? Once.
     pub(crate) fn is_to_be_told(&mut self, now: Instant) -> bool {
         let long = now.duration_since(self.since) >= TELL_AFTER;

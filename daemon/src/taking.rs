@@ -53,7 +53,7 @@ fn submit(
     submission.priority = handed.priority.unwrap_or(submission.priority);
     let answers = context.store.submit(std::slice::from_ref(&submission))?;
     let Some(submitted) = answers.first().copied() else { return Ok(Err(Untaken::Missing)) };
-    reconciler.known(&submission.source, submitted.id);
+    reconciler.known(&submission.source, submitted.id, submitted.new.then_some(submission.priority));
     orders.came(&submission.source.path, submitted.id, context.world.steady());
     Ok(Ok(submitted))
 }

@@ -1,7 +1,7 @@
 //! The job state machine: what may happen to a dropped file, in which order, and who is to blame. Pure: no I/O, no clock.
 //!
 //! ```text
-//!  Noticed                                        (a format that is not ours: left where it is)
+//!  Noticed ──want (a mesh names it)──► Queued     (a format that is not ours: left where it is)
 //!
 //!  Queued ──claim──► Running ──intend──► Publishing ──placed──► Published ──finished──► Ended
 //!    ▲ ▲                │ │                 ▲  │

@@ -267,11 +267,6 @@ impl<T: Tables> Queue<T> {
         }
         Ok(None)
     }
-
-    /// The job that answers for this file already.
-    fn answering(&self, inner: &Inner, file: &Identity<'_>) -> Result<Option<JobId>, StoreError> {
-        Ok(self.latest_of(inner, file)?.filter(Job::answers_for_source).map(|job| job.id))
-    }
 }
 
 impl<T: Tables> JobStore for Queue<T> {

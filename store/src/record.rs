@@ -6,13 +6,13 @@
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
-use crate::job::{Job, State};
-use crate::news::{Notice, Word};
+use crate::job::{Ending, Job, Kind, State};
+use crate::news::{News, Notice, Word};
 use crate::store::StoreError;
 use crate::tables::Table;
 
 /// Version of what the JSON means. Raised when an older program would misread it.
-pub(crate) const SCHEMA: u16 = 6;
+pub(crate) const SCHEMA: u16 = 8;
 /// That of a record in which nothing is that version 2 did not know.
 const PLAIN: u16 = 2;
 /// That of a job that was approved.
@@ -24,6 +24,10 @@ const HEAD: u16 = 4;
 const WORD: u16 = 5;
 /// That of a job that ends for want of a name, an end that an earlier program does not know.
 const NAMELESS: u16 = 6;
+/// That of a job whose file was carried, an end that an earlier program does not know.
+const CARRIED: u16 = 7;
+/// That of news that count such jobs.
+const WORD_OF_CARRIED: u16 = 8;
 /// Largest record in bytes. The database would put values from a quarter of its segment on into files of their own.
 pub(crate) const MAX: usize = 7040;
 
@@ -47,13 +51,22 @@ fn checksum(table: Table, key: &[u8], schema: u16, json: &[u8]) -> u32 {
 
 /// `job` as a record under `key`.
 pub(crate) fn encode_job(key: &[u8], job: &Job) -> Result<Vec<u8>, StoreError> {
-    let is_nameless = job.publication().is_some_and(|publication| publication.ending.is_for_want_of_a_name());
-    let schema = match job.state {
-        State::Approved { .. } => APPROVED,
-        _ if is_nameless => NAMELESS,
+    encode_as(schema_of(job), Table::Jobs, key, job)
+}
+
+/// The lowest version that knows all of it.
+fn schema_of(job: &Job) -> u16 {
+    match (&job.state, job.publication().map(|publication| publication.ending)) {
+        (State::Approved { .. }, _) => APPROVED,
+        (_, Some(Ending::Carried)) => CARRIED,
+        (_, Some(ending)) if ending.is_for_want_of_a_name() => NAMELESS,
         _ => PLAIN,
-    };
-    encode_as(schema, Table::Jobs, key, job)
+    }
+}
+
+/// `job`, as it stood at its end, as a record of the outbox under `key`.
+pub(crate) fn encode_end(key: &[u8], job: &Job) -> Result<Vec<u8>, StoreError> {
+    encode_as(schema_of(job), Table::Outbox, key, job)
 }
 
 /// The head as a record under `key`.
@@ -63,7 +76,8 @@ pub(crate) fn encode_head<T: Serialize>(key: &[u8], head: &T) -> Result<Vec<u8>,
 
 /// News as a record under `key`.
 pub(crate) fn encode_word(key: &[u8], word: &Word) -> Result<Vec<u8>, StoreError> {
-    encode_as(WORD, Table::Outbox, key, word)
+    let counts_carried = matches!(&word.news, News::Night { jobs, .. } if jobs.contains_key(&Kind::Carried));
+    encode_as(if counts_carried { WORD_OF_CARRIED } else { WORD }, Table::Outbox, key, word)
 }
 
 /// `value` as a record under `key` of `table`.
@@ -94,7 +108,7 @@ pub(crate) fn decode<T: DeserializeOwned>(table: Table, key: &[u8], bytes: &[u8]
 /// The notice in the record `bytes` under `key` of the outbox.
 pub(crate) fn decode_notice(key: &[u8], bytes: &[u8]) -> Result<Notice, StoreError> {
     match opened(Table::Outbox, key, bytes)? {
-        (WORD, json) => read(Table::Outbox, key, json).map(Notice::Word),
+        (WORD | WORD_OF_CARRIED, json) => read(Table::Outbox, key, json).map(Notice::Word),
         (_, json) => read(Table::Outbox, key, json).map(|job| Notice::End(Box::new(job))),
     }
 }
@@ -137,10 +151,7 @@ fn name(table: Table, key: &[u8]) -> String {
 mod tests {
     use super::*;
     use crate::id::{Attempt, Boot, Epoch, Hash, JobId, Recipe, Seq, Time, Token};
-    use crate::job::{
-        Area, Blame, Decision, Ending, Hold, MAX_BY, MAX_REASON, Parked, Priority, Publication, Source, Verdict, one_line,
-    };
-    use crate::news::News;
+    use crate::job::{Area, Blame, Decision, Hold, MAX_BY, MAX_REASON, Parked, Priority, Publication, Source, Verdict, one_line};
     use crate::path::{MAX_NAMED, MAX_SOURCE, RelPath};
 
     /// Everything a job can hold, as long as it can be: no transition can fail for want of room.
@@ -201,6 +212,8 @@ mod tests {
         assert_eq!(decode::<Job>(Table::Jobs, &key, &bytes).unwrap(), job);
     }
 
+    const LATER: u16 = SCHEMA + 1;
+
     /// F29, and F5.
     #[test]
     fn f29_records_of_another_time_or_place_are_told_apart() {
@@ -212,11 +225,11 @@ mod tests {
         damaged(decode(Table::Meta, b"head", b""));
         // A record of a later version, whole in itself.
         let mut later = bytes;
-        later[5] = 7;
-        let crc = checksum(Table::Meta, b"head", 7, b"7");
+        later[5] = LATER.to_be_bytes()[1];
+        let crc = checksum(Table::Meta, b"head", LATER, b"7");
         later[6..10].copy_from_slice(&crc.to_be_bytes());
         let result = decode::<u32>(Table::Meta, b"head", &later);
-        assert!(matches!(result, Err(StoreError::Newer { found: 7, known: SCHEMA })), "{result:?}");
+        assert!(matches!(result, Err(StoreError::Newer { found: LATER, known: SCHEMA })), "{result:?}");
     }
 
     /// A job as version 1 wrote it, without what was added since.
@@ -228,7 +241,7 @@ mod tests {
             "blame":{"charges":0,"deaths":1,"deaths_alone":0,"environment":0,"kills":0},"work":9,"submitted":5,"changed":6,"seq":11}"#;
         let key = 7_u64.to_be_bytes();
         let job: Job = decode(Table::Jobs, &key, &written(Table::Jobs, &key, 1, json)).unwrap();
-        assert_eq!((job.kind(), job.blame.deaths, job.hold().unwrap().boot), (crate::job::Kind::Publishing, 1, Boot(0)));
+        assert_eq!((job.kind(), job.blame.deaths, job.hold().unwrap().boot), (Kind::Publishing, 1, Boot(0)));
         assert_eq!((job.priority, job.waits_since()), (Priority::default(), Time(5)));
     }
 
@@ -248,10 +261,10 @@ mod tests {
             "original":"part.stl"}}},"attempts":1,"blame":{"charges":0,"deaths":0,"deaths_alone":0,"environment":0,"kills":0},"work":9,
             "submitted":5,"changed":6,"seq":12}"#;
         let Notice::End(job) = decode_notice(&key, &written(Table::Outbox, &key, 2, end)).unwrap() else { panic!("an end") };
-        assert_eq!((job.kind(), job.seq, job.publication().unwrap().ending), (crate::job::Kind::Done, Seq(12), Ending::Repaired));
+        assert_eq!((job.kind(), job.seq, job.publication().unwrap().ending), (Kind::Done, Seq(12), Ending::Repaired));
         let night = r#"{"seq":12,"at":7,"news":{"night":{"since":1,"until":6,"jobs":{"done":3,"needs_review":1}}}}"#;
         let Notice::Word(word) = decode_notice(&key, &written(Table::Outbox, &key, 5, night)).unwrap() else { panic!("a word") };
-        let jobs = [(crate::job::Kind::Done, 3), (crate::job::Kind::NeedsReview, 1)].into();
+        let jobs = [(Kind::Done, 3), (Kind::NeedsReview, 1)].into();
         assert_eq!(word, Word { seq: Seq(12), at: Time(7), news: News::Night { since: Time(1), until: Time(6), jobs } });
         let away = r#"{"seq":12,"at":7,"news":{"folder_away":{"folder":"hot","reason":"gone"}}}"#;
         assert_eq!(decode_notice(&key, &written(Table::Outbox, &key, 5, away)).unwrap().seq(), Seq(12));
@@ -261,12 +274,39 @@ mod tests {
         assert!([PLAIN, APPROVED, HEAD].iter().all(|earlier| schema > *earlier), "an earlier program takes it for no job");
     }
 
+    /// A program that does not know an end or a kind must not call the store damaged for it: it refuses the record by its schema.
+    #[test]
+    fn f29_carried_files_have_a_schema_of_their_own() {
+        let clean = crate::testkit::dropped("a.mtl", 9).unwrap().source;
+        let job = |ending| {
+            let job = Job::queued(JobId(7), clean.clone(), Time(5));
+            Job { state: State::Ended { publication: crate::testkit::result_of(&job, ending) }, ..job }
+        };
+        let schema = |bytes: Vec<u8>| u16::from_be_bytes([bytes[4], bytes[5]]);
+        let key = 7_u64.to_be_bytes();
+        for encode in [encode_job, encode_end] {
+            let schemas =
+                [Ending::Clean, Ending::Skipped, Ending::Carried].map(|ending| schema(encode(&key, &job(ending)).unwrap()));
+            assert_eq!(schemas, [PLAIN, NAMELESS, CARRIED]);
+        }
+        let told = decode_notice(&key, &encode_end(&key, &job(Ending::Carried)).unwrap()).unwrap();
+        assert_eq!(told, Notice::End(Box::new(job(Ending::Carried))));
+        let night = |kind| Word {
+            seq: Seq(7),
+            at: Time(7),
+            news: News::Night { since: Time(1), until: Time(6), jobs: [(kind, 1)].into() },
+        };
+        let bytes = encode_word(&key, &night(Kind::Carried)).unwrap();
+        assert_eq!(decode_notice(&key, &bytes).unwrap(), Notice::Word(night(Kind::Carried)));
+        assert_eq!([schema(bytes), schema(encode_word(&key, &night(Kind::Done)).unwrap())], [WORD_OF_CARRIED, WORD]);
+    }
+
     /// Whatever is to be told has room, so that a folder that goes can always be told of.
     #[test]
     fn the_largest_word_fits() {
         let longest = "\"".repeat(2 * MAX_REASON);
         let folder = "n".repeat(crate::queue::MAX_NAME - 2);
-        let jobs = crate::job::Kind::ALL.map(|kind| (kind, u64::MAX)).into();
+        let jobs = Kind::ALL.map(|kind| (kind, u64::MAX)).into();
         for news in [
             News::FolderAway { folder, reason: one_line(&longest) },
             News::Night { since: Time(u64::MAX), until: Time(u64::MAX), jobs },

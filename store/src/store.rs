@@ -17,7 +17,8 @@ pub const MOST_SUBSCRIBERS: usize = 32;
 /// store is opened again. Calls may come from any thread; calls at the same time share the cost of becoming durable.
 pub trait JobStore: Send + Sync {
     /// Takes found files in, all of them in one durable step where possible. Idempotent: a file that a job answers for already
-    /// gets that job's number. Answers in the order of `found`.
+    /// gets that job's number. A file that was only noticed, and is no [`Submission::foreign`] one any more, is queued: its job
+    /// counts as new. Answers in the order of `found`.
     ///
     /// # Errors
     /// [`StoreError::TooLong`] names a file whose path, folder or profile does not fit a record; nothing is taken in then.
@@ -206,7 +207,7 @@ pub struct Submission {
 pub struct Submitted {
     /// Its job.
     pub id: JobId,
-    /// `false`: the job was there already.
+    /// `false`: the job was there already, and not only noticed.
     pub new: bool,
 }
 

@@ -25,9 +25,10 @@ type Check = fn(&mut dyn Subject, &ManualClock) -> Result<(), StoreError>;
 /// # Panics
 /// When the store does not do what [`JobStore`] promises.
 pub fn conformance(make: &dyn Fn(Arc<dyn Clock>) -> Box<dyn Subject>) {
-    let checks: [(&str, Check); 28] = [
+    let checks: [(&str, Check); 29] = [
         ("submission is idempotent", claims::submission_is_idempotent),
         ("a file that came back is new", claims::a_file_that_came_back_is_new),
+        ("what was only noticed may be wanted later", claims::what_was_only_noticed_may_be_wanted_later),
         ("the oldest that fits is claimed", claims::the_oldest_that_fits_is_claimed),
         ("the more urgent goes first", claims::the_more_urgent_goes_first),
         ("the whole way", claims::the_whole_way),

@@ -199,7 +199,7 @@ impl Scene {
 
 /// Has a job, as listed, come to its end?
 pub fn has_ended(job: &Value) -> bool {
-    matches!(job["kind"].as_str(), Some("done" | "failed" | "needs_review" | "quarantined" | "cancelled" | "noticed"))
+    matches!(job["kind"].as_str(), Some("done" | "carried" | "failed" | "needs_review" | "quarantined" | "cancelled" | "noticed"))
 }
 
 /// In memory where there is a place for that: syncing is what a run waits for.

@@ -5,6 +5,8 @@
 
 #[path = "crash/approved.rs"]
 mod approved;
+#[path = "crash/carried.rs"]
+mod carried;
 #[path = "crash/deaths.rs"]
 mod deaths;
 #[path = "crash/lost.rs"]
@@ -48,7 +50,7 @@ fn assert_at_rest(hot: &Hot, what: &str) {
     assert_eq!(hot.tree(".suture/work"), Tree::new(), "{what}: left-overs");
     for job in hot.jobs() {
         let kind = job["kind"].as_str().expect("a kind");
-        assert!(matches!(kind, "done" | "failed" | "needs_review"), "{what}: {job}");
+        assert!(matches!(kind, "done" | "carried" | "failed" | "needs_review"), "{what}: {job}");
         assert_eq!(job["blame"]["charges"], 0, "{what}: {job}");
     }
 }

@@ -7,6 +7,7 @@ mod e2e {
     mod blind;
     mod burst;
     mod cases;
+    mod companions;
     mod config;
     mod files;
     mod formats;

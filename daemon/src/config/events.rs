@@ -27,6 +27,8 @@ pub(crate) enum Occasion {
     NeedsReview,
     Failed,
     Quarantined,
+    /// No mesh: a file that one names was copied to where its result is.
+    Carried,
     /// A night is over.
     Night,
     FolderAway,
@@ -42,6 +44,7 @@ impl Occasion {
     pub(crate) fn of(job: &Job) -> Option<Self> {
         match job.kind() {
             Kind::Done => Some(Self::Finished),
+            Kind::Carried => Some(Self::Carried),
             Kind::NeedsReview => Some(Self::NeedsReview),
             Kind::Failed => Some(Self::Failed),
             Kind::Quarantined => Some(Self::Quarantined),
@@ -65,6 +68,7 @@ impl Occasion {
             Self::NeedsReview => "needs_review",
             Self::Failed => "failed",
             Self::Quarantined => "quarantined",
+            Self::Carried => "carried",
             Self::Night => "night",
             Self::FolderAway => "folder_away",
             Self::FolderBack => "folder_back",

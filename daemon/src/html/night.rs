@@ -78,7 +78,7 @@ fn whole(night: &Night) -> Markup {
             div class={ "outcome " (if need.is_empty() { "good" } else { "review" }) } role="status" {
                 strong { (how_many_need_you(need.len() as u64)) }
                 @if !need.is_empty() { p { (of_which_kind(|kind| need.iter().filter(|job| job.kind() == kind).count() as u64)) "." } }
-                p { "Since " (time(*since)) ": " (show_count(count(Kind::Done))) " done, " (show_count(count(Kind::Rejected))) " rejected, " (show_count(count(Kind::Cancelled))) " cancelled." }
+                p { "Since " (time(*since)) ": " (show_count(count(Kind::Done))) " done, " @if count(Kind::Carried) > 0 { (show_count(count(Kind::Carried))) " carried along, " } (show_count(count(Kind::Rejected))) " rejected, " (show_count(count(Kind::Cancelled))) " cancelled." }
                 @if *live > 0 { p { (show_count(*live)) " not over yet: they wait or are in work." } }
             }
             @if !need.is_empty() {

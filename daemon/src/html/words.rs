@@ -47,6 +47,7 @@ pub(crate) fn label(kind: Kind) -> &'static str {
         Kind::Concluded | Kind::Publishing | Kind::Published => "Almost done",
         Kind::Parked => "Ready, but held up",
         Kind::Done => "Done",
+        Kind::Carried => "Carried along",
         Kind::Failed => "Failed",
         Kind::NeedsReview => "Needs review",
         Kind::Rejected => "Rejected",
@@ -58,7 +59,7 @@ pub(crate) fn label(kind: Kind) -> &'static str {
 /// Is it good, to be looked at, or bad?
 pub(crate) fn class(kind: Kind) -> &'static str {
     match kind {
-        Kind::Done => "good",
+        Kind::Done | Kind::Carried => "good",
         Kind::Noticed | Kind::Parked | Kind::NeedsReview => "review",
         Kind::Failed | Kind::Quarantined => "bad",
         _ => "",
@@ -107,6 +108,8 @@ fn ended(job: &Job, ending: Ending) -> String {
             let best = best.map_or_else(|| "the result".to_owned(), |name| format!("{}/{name}", area(ending.area())));
             format!("Look at the pictures and the reasons. If {best} is what the file was meant to be, approve it: then it is published. If not, reject it, and ask for a better file.")
         }
+        Ending::Carried if hint(job).is_some() => "Read the note. A mesh that names this file gets another one of that name.".into(),
+        Ending::Carried => "Nothing. It lies beside the result of the mesh that names it.".into(),
         Ending::Skipped => "Use what is there. If that is not it, take it out of out/, and drop this file again.".into(),
         Ending::NameTaken => "Look at what has that name in out/. Take it away, then try again; or give the file another name, and drop it again.".into(),
         Ending::NotGood => "Do not print it. Its report says what is wrong, and where. Ask for another file, or repair it under other settings, if a reason names one.".into(),
@@ -174,9 +177,12 @@ mod tests {
     /// Whoever comes in the morning knows of each file what to do with it.
     #[test]
     fn whatever_has_come_to_rest_has_advice() {
-        use Ending::{Clean, Environment, NameTaken, NeedsReview, NotGood, Quarantined, Refused, Repaired, Skipped, Unreadable};
+        use Ending::{
+            Carried, Clean, Environment, NameTaken, NeedsReview, NotGood, Quarantined, Refused, Repaired, Skipped, Unreadable,
+        };
         let all =
-            [Clean, Repaired, NeedsReview, NotGood, Unreadable, Refused, Environment, Quarantined, Skipped, NameTaken].map(ended);
+            [Clean, Repaired, NeedsReview, NotGood, Unreadable, Refused, Environment, Quarantined, Skipped, NameTaken, Carried]
+                .map(ended);
         let noticed = Job::noticed(JobId(1), job().source, "a picture", Time(0));
         let parked = Job { parked: Some(Parked { until: Some(Time(9)), tries: 1, committed: false }), ..job() };
         let cancelled = Job { state: State::Cancelled { why: Withdrawal::Operator }, ..job() };

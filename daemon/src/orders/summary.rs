@@ -11,6 +11,7 @@ use suture_store::job::{Area, Kind};
 use suture_store::{Job, RelPath, State, Time};
 
 use crate::folder::{Folder, make_parent};
+use crate::left::has_report;
 use crate::names::VERSIONS;
 use crate::receipt::REPORT;
 use crate::units::show_count;
@@ -60,7 +61,7 @@ struct Line {
 impl Line {
     /// Good, or of a format that is not ours to judge, or not what is wanted any more.
     fn is_good(&self) -> bool {
-        self.later.is_some() || matches!(self.kind, Kind::Done | Kind::Noticed)
+        self.later.is_some() || matches!(self.kind, Kind::Done | Kind::Carried | Kind::Noticed)
     }
 
     fn of(job: &Job) -> Self {
@@ -71,7 +72,7 @@ impl Line {
                 let good = publication.ending.is_good();
                 let place = if good { "out" } else { name(publication.ending.area()) };
                 result = publication.output.as_ref().map(|output| format!("{place}/{output}"));
-                report = publication.base().map(|base| format!("{place}/{base}{REPORT}"));
+                report = publication.base().filter(|_| has_report(publication)).map(|base| format!("{place}/{base}{REPORT}"));
                 reason.clone_from(&publication.reason);
             }
             State::Noticed { reason: what } => reason.clone_from(what),

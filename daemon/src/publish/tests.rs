@@ -25,9 +25,7 @@ impl Scene {
     }
 
     fn new_where(on_taken: OnTaken) -> Self {
-        let scene = Self::dropped_where(on_taken);
-        crate::claim::claim(&scene.folder, &scene.claim.job, &scene.folder.work(scene.claim.token), u64::MAX).unwrap();
-        scene
+        Self::claimed("part.stl", ORIGINAL, on_taken)
     }
 
     pub(crate) fn dropped() -> Self {
@@ -35,15 +33,26 @@ impl Scene {
     }
 
     fn dropped_where(on_taken: OnTaken) -> Self {
+        Self::dropped_as("part.stl", ORIGINAL, on_taken)
+    }
+
+    /// A file of this name and content, taken into work.
+    pub(in crate::publish) fn claimed(name: &str, content: &[u8], on_taken: OnTaken) -> Self {
+        let scene = Self::dropped_as(name, content, on_taken);
+        crate::claim::claim(&scene.folder, &scene.claim.job, &scene.folder.work(scene.claim.token), u64::MAX).unwrap();
+        scene
+    }
+
+    fn dropped_as(name: &str, content: &[u8], on_taken: OnTaken) -> Self {
         let dir = tempfile::tempdir().unwrap();
         let config = FolderConfig { name: "hot".into(), on_taken, ..FolderConfig::of(dir.path()) };
         let folder = Folder::open(&config, None).unwrap();
-        let path = folder.inbox().join("part.stl");
-        create::write_new(&path, ORIGINAL).unwrap();
+        let path = folder.inbox().join(name);
+        create::write_new(&path, content).unwrap();
         let found = Identity::of(&path).unwrap();
         let source = Source {
             folder: "hot".into(),
-            path: RelPath::new(*b"part.stl").unwrap(),
+            path: RelPath::new(name).unwrap(),
             dev: found.dev,
             ino: found.ino,
             size: found.size,
@@ -56,7 +65,7 @@ impl Scene {
         Self { _dir: dir, folder, store, claim, committed: Cell::new(false) }
     }
 
-    fn desk(&self) -> Desk<'_> {
+    pub(in crate::publish) fn desk(&self) -> Desk<'_> {
         Desk::new(&self.store, &self.folder, &self.claim, &self.committed)
     }
 
@@ -72,7 +81,7 @@ impl Scene {
     }
 
     /// Does what is owed until nothing is.
-    fn finish(&self, mut job: Job) -> Job {
+    pub(in crate::publish) fn finish(&self, mut job: Job) -> Job {
         loop {
             job = match &job.state {
                 State::Publishing { .. } => self.desk().place(&job).unwrap(),
@@ -82,7 +91,7 @@ impl Scene {
         }
     }
 
-    fn read(&self, path: &str) -> Vec<u8> {
+    pub(in crate::publish) fn read(&self, path: &str) -> Vec<u8> {
         std::fs::read(self.folder.root.join(path)).unwrap_or_default()
     }
 }

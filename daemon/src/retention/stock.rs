@@ -45,13 +45,17 @@ impl Stock {
         let results = !(keep.results.is_open() && keep.reports.is_open());
         let originals = keep.archive().is_some();
         let mut stock = Self::default();
-        if results {
+        if results || originals {
             let out = Area::read(root, OUT)?;
-            out.receipts().for_each(|(base, receipt)| out.told_by(&base, &receipt, &mut stock.pieces));
-            out.summaries(&mut stock.pieces);
-        }
-        if originals {
-            Area::read(root, DONE)?.originals(&[], &mut stock);
+            if results {
+                out.receipts().for_each(|(base, receipt)| out.told_by(&base, &receipt, &mut stock.pieces));
+                out.summaries(&mut stock.pieces);
+            }
+            if originals {
+                let done = Area::read(root, DONE)?;
+                done.originals(&[], &mut stock);
+                done.went_along(&out, &mut stock);
+            }
         }
         for name in MIXED.iter().filter(|_| results || originals) {
             let area = Area::read(root, name)?;
@@ -59,6 +63,7 @@ impl Stock {
             area.receipts().for_each(|(base, receipt)| area.told_by(&base, &receipt, &mut told));
             if originals {
                 area.originals(&told, &mut stock);
+                area.went_along(&area, &mut stock);
             }
             if results {
                 stock.pieces.extend(told);
@@ -192,6 +197,29 @@ impl Area {
     }
 }
 
+impl Area {
+    /// Files here that are no meshes, and of which a receipt in the area `told` says that they went along with one.
+    fn went_along(&self, told: &Self, stock: &mut Stock) {
+        let mut known = BTreeSet::new();
+        for (_, receipt) in told.receipts() {
+            let Some(path) = receipt.original.as_ref().filter(|_| !receipt.stays).map(RelPath::to_path) else { continue };
+            let is_other = path.file_name().is_some_and(|name| name_kind(name) == NameKind::Foreign);
+            let is_it = |found: &&Identity| (found.size, Some(found.mtime_ns)) == (receipt.source_bytes, receipt.source_mtime_ns);
+            let Some(found) = self.files.get(&path).filter(|_| is_other).filter(is_it) else { continue };
+            let path = Path::new(self.name).join(path);
+            if known.insert(path.clone()) {
+                stock.pieces.push(Piece {
+                    what: What::Original,
+                    path,
+                    bytes: found.size,
+                    since: time(found.ctime_ns),
+                    hash: None,
+                });
+            }
+        }
+    }
+}
+
 fn time(ns: i64) -> Time {
     Time(u64::try_from(ns / 1_000_000).unwrap_or(0))
 }
@@ -265,6 +293,31 @@ mod tests {
         let touched = Identity { ctime_ns: own.ctime_ns + TOGETHER_NS + 1, ..own };
         assert!(!area.is_no_original(Path::new("x.stl"), &touched, &own));
         assert!(area.is_no_original(Path::new("x.stl"), &own, &own));
+    }
+
+    /// A texture is an original where a receipt says so, and it is the file that the receipt is of.
+    #[test]
+    fn files_that_went_along_are_originals() {
+        let dir = tempfile::tempdir().unwrap();
+        let root = dir.path();
+        let mtime_ns = |name: &str| fsx::look(&root.join(name)).unwrap().unwrap().mtime_ns;
+        for name in ["done/a.png", "done/b.png", "done/mine.png", "failed/c.png"] {
+            put(root, name, b"wood");
+        }
+        for (receipt, original, mtime_ns) in [
+            ("out/a.png", "a.png", mtime_ns("done/a.png")),
+            ("out/b.png", "b.png", mtime_ns("done/b.png") - 1),
+            ("out/d.png", "../failed/c.png", mtime_ns("failed/c.png")),
+            ("failed/c.png", "c.png", mtime_ns("failed/c.png")),
+        ] {
+            let text = format!(
+                "{{\"receipt_version\":1,\"ending\":\"carried\",\"original\":\"{original}\",\"source_bytes\":4,\"source_mtime_ns\":{mtime_ns}}}"
+            );
+            put(root, &format!("{receipt}.suture.json"), text.as_bytes());
+        }
+        let originals: Vec<_> =
+            found(root).into_iter().filter(|(what, _)| *what == What::Original).map(|(_, path)| path).collect();
+        assert_eq!(originals, ["done/a.png", "failed/c.png"]);
     }
 
     #[test]

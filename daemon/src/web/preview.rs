@@ -16,7 +16,7 @@ use super::problem::Problem;
 use super::reported::report_of;
 use super::shared::Shared;
 use super::verified::Which;
-use crate::left::{area, result_path};
+use crate::left::{area, has_report, result_path};
 
 /// Which of the two meshes is shown.
 #[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq)]
@@ -111,6 +111,9 @@ fn after(shared: &Shared, job: &Job) -> Result<Option<Known>, Problem> {
     let JobState::Ended { publication } = &job.state else {
         return Err(Problem::conflict(format!("job {} is {}; there is nothing to show yet", job.id, job.kind())));
     };
+    if !has_report(publication) {
+        return Err(no_mesh(job.id));
+    }
     let path = result_path(&folder_of(&shared.context, job)?.root, job);
     Ok(path.zip(publication.output_hash).map(|(path, hash)| Known { which: Which::Result, path, hash }))
 }

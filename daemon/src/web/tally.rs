@@ -31,6 +31,8 @@ pub(super) struct Ended {
     pub repaired: u64,
     /// Not repaired, since there is a result of that name.
     pub skipped: u64,
+    /// No meshes, but files that meshes name.
+    pub carried: u64,
     /// Of those that are clean or repaired: copies of earlier results.
     pub reused: u64,
     pub needs_review: u64,
@@ -51,6 +53,7 @@ impl Ended {
             Ending::Clean => &mut self.clean,
             Ending::Repaired => &mut self.repaired,
             Ending::Skipped => &mut self.skipped,
+            Ending::Carried => &mut self.carried,
             Ending::NeedsReview if job.kind() == Kind::Rejected => &mut self.rejected,
             Ending::NeedsReview => &mut self.needs_review,
             Ending::Quarantined => &mut self.quarantined,

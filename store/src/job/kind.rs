@@ -26,6 +26,8 @@ pub enum Kind {
     Parked,
     /// Good, and in `out/`.
     Done,
+    /// No mesh, but named by one: in `out/`, as it was dropped.
+    Carried,
     /// Not good, and in `failed/`.
     Failed,
     /// Good, but a person must look; in `failed/`.
@@ -40,7 +42,7 @@ pub enum Kind {
 
 impl Kind {
     /// All of them, in the order of a job's life.
-    pub const ALL: [Self; 15] = [
+    pub const ALL: [Self; 16] = [
         Self::Noticed,
         Self::Queued,
         Self::Waiting,
@@ -51,6 +53,7 @@ impl Kind {
         Self::Published,
         Self::Parked,
         Self::Done,
+        Self::Carried,
         Self::Failed,
         Self::NeedsReview,
         Self::Rejected,
@@ -71,6 +74,7 @@ impl Kind {
             Self::Published => "published",
             Self::Parked => "parked",
             Self::Done => "done",
+            Self::Carried => "carried",
             Self::Failed => "failed",
             Self::NeedsReview => "needs_review",
             Self::Rejected => "rejected",

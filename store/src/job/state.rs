@@ -54,6 +54,8 @@ pub enum Ending {
     Repaired,
     /// Not repaired, since its result would have a name that is taken, and its folder wants no second one.
     Skipped,
+    /// No mesh: a file that a mesh names, copied to where the result of that mesh is.
+    Carried,
     /// Repaired, but a person must look.
     NeedsReview,
     /// Not good under the profile after all repairs.
@@ -74,7 +76,7 @@ impl Ending {
     /// Where the original goes.
     pub fn area(self) -> Area {
         match self {
-            Self::Clean | Self::Repaired | Self::Skipped => Area::Done,
+            Self::Clean | Self::Repaired | Self::Skipped | Self::Carried => Area::Done,
             Self::NeedsReview | Self::NotGood | Self::Unreadable | Self::Refused | Self::NameTaken | Self::Environment => {
                 Area::Failed
             }
@@ -110,7 +112,7 @@ pub struct Publication {
     pub reason: String,
     /// The repaired mesh.
     pub output: Option<RelPath>,
-    /// Of the bytes of the repaired mesh.
+    /// Of the bytes of the repaired mesh; of a file that was carried, also where `out/` had those bytes before, and `output` is none.
     pub output_hash: Option<Hash>,
     /// Of the bytes of the report.
     pub report_hash: Option<Hash>,
@@ -360,6 +362,7 @@ impl Job {
             State::Published { .. } => Kind::Published,
             State::Ended { publication } => match publication.ending {
                 Ending::Clean | Ending::Repaired | Ending::Skipped => Kind::Done,
+                Ending::Carried => Kind::Carried,
                 Ending::NeedsReview if publication.decision.is_some() => Kind::Rejected,
                 Ending::NeedsReview => Kind::NeedsReview,
                 Ending::Quarantined => Kind::Quarantined,

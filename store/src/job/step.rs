@@ -27,6 +27,8 @@ pub enum Event {
     Cancel,
     /// A file that was only noticed is gone.
     Forget,
+    /// A file that was only noticed is wanted after all, this soon.
+    Want(Priority),
     /// Its pause is over before its time.
     Hasten,
     /// An operator wants it sooner, or later.
@@ -79,6 +81,7 @@ impl Event {
             Self::Retry => "retried",
             Self::Cancel => "cancelled",
             Self::Forget => "forgotten",
+            Self::Want(_) => "taken after all",
             Self::Hasten => "hastened",
             Self::Rank(_) => "given a priority",
             Self::Decide(decision) => decision.verdict.name(),
@@ -128,6 +131,10 @@ impl Job {
             Event::Decide(decision) => next.decide(decision, now).ok_or(illegal)??,
             Event::Forget => match next.state {
                 State::Noticed { .. } => next.state = State::Cancelled { why: Withdrawal::Vanished },
+                _ => return Err(illegal),
+            },
+            Event::Want(priority) => match next.state {
+                State::Noticed { .. } => (next.state, next.priority) = (NOW, *priority),
                 _ => return Err(illegal),
             },
         }

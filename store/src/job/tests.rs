@@ -54,6 +54,7 @@ fn endings() -> impl Strategy<Value = Ending> {
     prop_oneof![
         Just(Ending::Clean),
         Just(Ending::Repaired),
+        Just(Ending::Carried),
         Just(Ending::NeedsReview),
         Just(Ending::NotGood),
         Just(Ending::Unreadable),
@@ -99,6 +100,7 @@ fn events() -> impl Strategy<Value = Event> {
         1 => Just(Event::Retry),
         1 => Just(Event::Cancel),
         1 => Just(Event::Forget),
+        1 => Just(Event::Want(Priority::HIGHEST)),
         1 => Just(Event::Hasten),
         2 => prop_oneof![Just(Verdict::Approved), Just(Verdict::Rejected)].prop_map(|verdict| Event::Decide(said(verdict))),
         1 => (0..=9_i64).prop_map(|n| Event::Rank(Priority::try_from(n).unwrap())),
@@ -134,8 +136,8 @@ fn check_transition(before: &Job, event: &Event, after: &Job) -> Result<(), Test
 
     // At rest means at rest: only an operator wakes a job, and never one with a good result.
     if before.duty() == Duty::Rest {
-        prop_assert!(matches!(event, Event::Retry | Event::Cancel | Event::Forget | Event::Decide(_)));
-        prop_assert!(before.kind() != Kind::Done);
+        prop_assert!(matches!(event, Event::Retry | Event::Cancel | Event::Forget | Event::Want(_) | Event::Decide(_)));
+        prop_assert!(!matches!(before.kind(), Kind::Done | Kind::Carried));
     }
     // What is intended is what is placed and what the job ends with.
     if let (State::Publishing { publication: intent, .. }, State::Published { publication, .. }) = (&before.state, &after.state) {

@@ -32,6 +32,7 @@ fn tag(kind: Kind) -> u8 {
         Kind::Cancelled => 13,
         Kind::Parked => 14,
         Kind::Rejected => 15,
+        Kind::Carried => 16,
     }
 }
 

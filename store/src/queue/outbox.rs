@@ -39,7 +39,7 @@ pub(super) fn entry(subscribers: &Subscribers, from: Option<&Job>, to: &Job) -> 
         return Ok(None);
     }
     let key = key(to.seq);
-    let value = record::encode(Table::Outbox, &key, to)?;
+    let value = record::encode_end(&key, to)?;
     Ok(Some(Put { table: Table::Outbox, key: key.to_vec(), value: Some(value) }))
 }
 

@@ -4,7 +4,8 @@ use std::collections::BTreeMap;
 
 use super::files::Identity;
 use super::{Head, Queue, fits};
-use crate::job::Job;
+use crate::id::{JobId, Time};
+use crate::job::{Event, Job, Kind};
 use crate::path::MAX_SOURCE;
 use crate::store::{StoreError, Submission, Submitted};
 use crate::tables::Tables;
@@ -42,33 +43,52 @@ impl<T: Tables> Queue<T> {
         let now = self.clock.now();
         let inner = self.lock();
         let mut head = inner.head;
-        let mut jobs: Vec<Job> = Vec::new();
+        let mut jobs: Vec<(Option<Job>, Job)> = Vec::new();
         let mut keys = BTreeMap::new();
         for submission in found {
             let file = Identity::from(&submission.source);
-            if let Some(id) = keys.get(&file).copied().map_or_else(|| self.answering(&inner, &file), |id| Ok(Some(id)))? {
+            if let Some(id) = keys.get(&file).copied() {
                 answers.push(Submitted { id, new: false });
                 continue;
             }
-            head.seq.0 += 1;
-            head.last_job.0 += 1;
-            let id = head.last_job;
-            let source = submission.source.clone();
-            let mut job = match &submission.foreign {
-                None => Job::queued(id, source, now),
-                Some(what) => Job::noticed(id, source, what, now),
+            let known = self.latest_of(&inner, &file)?.filter(Job::answers_for_source);
+            let (before, mut job) = match (known, &submission.foreign) {
+                // Only noticed until now, and wanted since.
+                (Some(noticed), None) if noticed.kind() == Kind::Noticed => {
+                    let wanted = noticed.after(&Event::Want(submission.priority), now);
+                    let job = wanted.map_err(|source| StoreError::Illegal { id: noticed.id, source })?;
+                    (Some(noticed), job)
+                }
+                (Some(known), _) => {
+                    answers.push(Submitted { id: known.id, new: false });
+                    continue;
+                }
+                (None, _) => {
+                    head.last_job.0 += 1;
+                    (None, found_now(head.last_job, submission, now))
+                }
             };
-            job.priority = submission.priority;
+            head.seq.0 += 1;
             job.seq = head.seq;
-            jobs.push(job);
-            keys.insert(file, id);
-            answers.push(Submitted { id, new: true });
+            keys.insert(file, job.id);
+            answers.push(Submitted { id: job.id, new: true });
+            jobs.push((before, job));
         }
         if jobs.is_empty() {
             return Ok(None);
         }
-        let changes: Vec<_> = jobs.iter().map(|job| (None, job)).collect();
+        let changes: Vec<_> = jobs.iter().map(|(before, job)| (before.as_ref(), job)).collect();
         self.commit(inner, head, &changes)?;
         Ok(Some(head))
     }
+}
+
+/// The job of a file that no job answers for.
+fn found_now(id: JobId, submission: &Submission, now: Time) -> Job {
+    let source = submission.source.clone();
+    let job = match &submission.foreign {
+        None => Job::queued(id, source, now),
+        Some(what) => Job::noticed(id, source, what, now),
+    };
+    Job { priority: submission.priority, ..job }
 }

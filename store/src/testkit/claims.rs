@@ -56,6 +56,35 @@ pub(super) fn a_file_that_came_back_is_new(subject: &mut dyn Subject, _: &Manual
     Ok(())
 }
 
+/// A mesh that names it may come later: then the same job is queued, once, as urgent as the mesh. What an operator took back stays back.
+pub(super) fn what_was_only_noticed_may_be_wanted_later(subject: &mut dyn Subject, _: &ManualClock) -> Result<(), StoreError> {
+    let store = subject.store();
+    let foreign = |name: &str| Ok::<_, StoreError>(Submission { foreign: Some("a .mtl file".into()), ..named(name, 9)? });
+    let wanted = |name: &str| Ok::<_, StoreError>(Submission { priority: Priority::HIGHEST, ..named(name, 9)? });
+    store.submit(&[foreign("a.mtl")?, foreign("b.mtl")?])?;
+    store.control(JobId(2), Control::Cancel)?;
+    assert_eq!(store.claim(&Filter::default())?, None);
+    let answers = store.submit(&[wanted("a.mtl")?, wanted("b.mtl")?, wanted("a.mtl")?, wanted("c.mtl")?])?;
+    let answers: Vec<_> = answers.iter().map(|answer| (answer.id.0, answer.new)).collect();
+    assert_eq!(answers, [(1, true), (2, false), (1, false), (3, true)]);
+    subject.restart();
+    let store = subject.store();
+    assert_eq!(
+        [1, 2, 3].map(|id| job(store, JobId(id)).map(|job| job.kind()).ok()),
+        [Kind::Queued, Kind::Cancelled, Kind::Queued].map(Some)
+    );
+    assert!(
+        store
+            .submit(&[foreign("a.mtl")?, wanted("a.mtl")?])?
+            .iter()
+            .all(|answer| *answer == crate::store::Submitted { id: JobId(1), new: false })
+    );
+    let claim = claim_any(store)?;
+    assert_eq!((claim.id, claim.job.priority), (JobId(1), Priority::HIGHEST));
+    assert_eq!(finish(store, &claim, Ending::Carried, true)?.kind(), Kind::Carried);
+    Ok(())
+}
+
 pub(super) fn the_oldest_that_fits_is_claimed(subject: &mut dyn Subject, _: &ManualClock) -> Result<(), StoreError> {
     let store = subject.store();
     let sizes = [5000, 100, 4096, 4095, 1, 0, 70_000];

@@ -21,12 +21,13 @@ use crate::web::problem::Problem;
 use crate::web::shared::Shared;
 
 /// Choices of states: words, and names with commas.
-const CHOICES: [(&str, &[Kind]); 9] = [
+const CHOICES: [(&str, &[Kind]); 10] = [
     ("Need review", &[Kind::NeedsReview]),
     ("Rejected", &[Kind::Rejected]),
     ("Failed", &[Kind::Failed]),
     ("In quarantine", &[Kind::Quarantined]),
     ("Done", &[Kind::Done]),
+    ("Carried along", &[Kind::Carried]),
     ("In work", &[Kind::Running, Kind::Concluded, Kind::Publishing, Kind::Published]),
     ("Waiting", &[Kind::Queued, Kind::Waiting, Kind::Alone]),
     ("Held up or not taken", &[Kind::Parked, Kind::Noticed]),

@@ -113,7 +113,7 @@ fn standing(job: &Job, reasons: &[String], report: Option<&Report>) -> Markup {
 fn downloads(job: &Job) -> Markup {
     let JobState::Ended { publication } = &job.state else { return html! {} };
     html! {
-        @if publication.output_hash.is_some() {
+        @if publication.output.is_some() && publication.output_hash.is_some() {
             li { a class="button" href={ "/v1/jobs/" (job.id) "/result" } download { @if publication.ending.is_good() { "Download the result" } @else { "Download the best attempt" } } }
         }
         @if publication.report_hash.is_some() { li { a class="button" href={ "/v1/jobs/" (job.id) "/report" } download { "Download the report (JSON)" } } }

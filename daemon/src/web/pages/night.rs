@@ -203,7 +203,7 @@ pub(super) fn progress(job: &Job, bus: &Bus) -> Markup {
 }
 
 fn last_day(night: &Night) -> Markup {
-    let Ended { clean, repaired, skipped, reused, needs_review, rejected, failed, quarantined, .. } = night.ended;
+    let Ended { clean, repaired, skipped, carried, reused, needs_review, rejected, failed, quarantined, .. } = night.ended;
     let entry = |count: u64, class: &str, words: &str, kind: Kind| {
         html! { li class=[(count > 0).then_some(class)] { b { (show_count(count)) } @if count > 0 { a href=(list_of(&[kind])) { (words) } } @else { (words) } } }
     };
@@ -213,6 +213,7 @@ fn last_day(night: &Night) -> Markup {
             (entry(clean, "good", "clean", Kind::Done))
             (entry(repaired, "good", "repaired", Kind::Done))
             @if skipped > 0 { (entry(skipped, "good", "skipped", Kind::Done)) }
+            @if carried > 0 { (entry(carried, "", "carried along", Kind::Carried)) }
             (entry(needs_review, "review", "need review", Kind::NeedsReview))
             @if rejected > 0 { (entry(rejected, "", "rejected", Kind::Rejected)) }
             (entry(failed, "bad", "failed", Kind::Failed))

@@ -56,6 +56,13 @@ pub(crate) fn ask_for_review(report: &mut Report, reason: String) {
     }
 }
 
+/// Asks a person to look at a result that is no copy, if there is a doubt.
+pub(crate) fn ask_if_doubtful(report: &mut Report, doubt: Option<&str>) {
+    if let Some(reason) = doubt.filter(|_| report.outcome == Outcome::Repaired) {
+        ask_for_review(report, reason.into());
+    }
+}
+
 /// The harm that an account tells of.
 pub(crate) fn harm(account: Account) -> Option<String> {
     let harmed = account.lost + account.approximated;

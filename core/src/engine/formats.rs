@@ -102,7 +102,9 @@ pub(crate) fn into_stl(mesh: MeshFile, output: &Path, target: Target, work: Work
     let nameless = if loses && profile.attributes == KeepAttributes::Refuse { Some(Nameless::new(limits)?) } else { None };
     let place = nameless.as_ref().map(Nameless::path);
     let output = place.as_deref().unwrap_or(output);
+    let doubt = mesh.doubt();
     let mut report = files::make(mesh, output, target.is_input, (profile, limits), progress, clock)?.report;
+    carried::ask_if_doubtful(&mut report, doubt);
     if loses && report.output.is_some() {
         let account = Account { lost: triangles, ..Account::default() };
         report.attributes = Some(account.told());
@@ -130,6 +132,7 @@ pub(crate) fn through_a_spool(
     let spool = nameless.path();
     let made = make(mesh, &spool, clock)?;
     let mut report = made.report.clone();
+    carried::ask_if_doubtful(&mut report, made.mesh.doubt());
     let Some(facts) = report.output.as_ref() else { return Ok(report) };
     let is_copy = target.is_input && facts.blake3 == report.input.blake3;
     let said = Said::by(&made.mesh);
@@ -194,6 +197,7 @@ pub(crate) fn convert(
     let written = match target.layout {
         Some(layout) if !target.is_input => {
             refuse_infinite(&mesh)?;
+            refuse_unit(&mesh, layout)?;
             let work = Work { profile: &Profile::default(), limits, progress };
             encode((&mesh, mesh.parts(), input), output, layout, work, &mut Clock::start())?
         }
@@ -210,6 +214,18 @@ pub(crate) fn convert(
     mesh.check_unchanged()?;
     let facts = |mesh: &MeshFile| files::facts(mesh, files::hash(mesh, limits, progress));
     Ok(Converted { input: facts(&mesh), output: facts(&written) })
+}
+
+/// AMF has no centimetre (ISO/ASTM 52915:2020, section 5.2): its readers would take other lengths.
+fn refuse_unit(mesh: &MeshFile, layout: Layout) -> Result<()> {
+    if !matches!(layout, Layout::Amf(_)) || mesh.unit() != Some("centimeter") {
+        return Ok(());
+    }
+    Err(Error::Refused {
+        path: mesh.path().into(),
+        reason: "coordinates in centimetres, a unit that AMF does not have".into(),
+        advice: "take 3MF for the result".into(),
+    })
 }
 
 /// No decimal number is infinite, nor none at all.

@@ -95,8 +95,11 @@ fn is_written(mesh: &MeshFile, is_copy: bool, differ: bool, report: &mut Report,
             return false;
         }
     }
-    if differ && report.outcome == Outcome::Clean {
+    if !is_copy && report.outcome == Outcome::Clean {
         report.outcome = Outcome::Repaired;
+    }
+    if !is_copy {
+        carried::ask_if_doubtful(report, mesh.doubt());
     }
     // Good as it came; or not good, and what could be repaired of it is.
     differ || report.outcome == Outcome::Clean || work.profile.repair

@@ -15,7 +15,8 @@ use crate::engine::clock::Clock;
 use crate::engine::files::{self, Made};
 use crate::engine::together::Section;
 use crate::engine::work::Work;
-use crate::io::read::{Archive, MeshFile, MeshRecords, PackageFile, Place, slicer};
+use crate::io::read::slicer::{self, Config};
+use crate::io::read::{Archive, MeshFile, MeshRecords, PackageFile, Place};
 use crate::io::record::Record;
 use crate::io::write_behind::{self, Nameless, WriteBehind};
 use crate::output::archive;
@@ -56,7 +57,8 @@ pub(super) struct Maker<'a> {
 pub(super) struct Changed {
     /// New content by number of the entry.
     content: BTreeMap<usize, Mmap>,
-    config: Option<(usize, Vec<u8>)>,
+    /// New texts of the parts that hold volumes.
+    configs: Vec<(usize, Vec<u8>)>,
     pub(super) account: Account,
     /// Objects whose sets of triangles are left out.
     pub(super) objects_without_sets: u64,
@@ -84,6 +86,10 @@ impl<'a> Maker<'a> {
         let read = self.package.read(place, self.work.limits, self.work.progress)?;
         clock.stage("read");
         let units = units::of(self.package, place, &read)?;
+        if units.is_empty() {
+            self.expect(place, &[], &[], &read);
+            return Ok(());
+        }
         let mut mended = Vec::with_capacity(units.len());
         for unit in &units {
             mended.push(if unit.is_repaired { Some(self.mend(unit, &read, sections, clock)?) } else { None });
@@ -179,24 +185,24 @@ impl<'a> Maker<'a> {
             content.insert(entry, map);
         }
         let is_renumbered = self.package.volumes().iter().map(|volume| &volume.triangles).ne(&self.volumes);
-        let config = self.package.config().filter(|_| is_renumbered);
-        let config = config.map(|(entry, text)| (entry, slicer::renumbered(text, self.package.volumes(), &self.volumes)));
+        let renumbered = |of: &Config| (of.entry, slicer::renumbered(&of.text, &of.volumes, &self.volumes));
+        let configs = self.package.configs().iter().filter(|_| is_renumbered).map(renumbered).collect();
         let objects_without_sets = self.objects_without_sets;
-        Ok(Changed { content, config, account: self.account, objects_without_sets, expected: self.expected })
+        Ok(Changed { content, configs, account: self.account, objects_without_sets, expected: self.expected })
     }
 }
 
 impl Changed {
     /// The package stays as it came.
     pub(super) fn is_none(&self) -> bool {
-        self.content.is_empty() && self.config.is_none()
+        self.content.is_empty() && self.configs.is_empty()
     }
 
     /// Writes the package to the new file `output`.
     pub(super) fn write(&self, package: &PackageFile, output: &Path, work: Work<'_>) -> Result<()> {
         let archive = Archive::open(package.bytes()).map_err(|rejection| rejection.at(package.path()))?;
         let replaced = |entry: usize| {
-            let config = || self.config.as_ref().filter(|(own, _)| *own == entry).map(|(_, text)| text.as_slice());
+            let config = || self.configs.iter().find(|(own, _)| *own == entry).map(|(_, text)| text.as_slice());
             self.content.get(&entry).map(|map| &map[..]).or_else(config)
         };
         archive::write(&archive, replaced, output, work.limits, work.progress)

@@ -81,9 +81,31 @@ pub(crate) fn repair_as(package: &PackageFile, output: &Path, work: Work<'_>, cl
         let converted = formats::convert(&spool.path(), output, work.profile.format, work.limits, work.progress)?;
         clock.stage("encode");
         report.output = Some(converted.output);
-        certify(&mut report);
+        judge_built(&mut report, output, work, clock)?;
     }
     Ok(report)
+}
+
+/// Judges what was written of all objects where they are placed: they may cross there, and coordinates are rounded anew.
+fn judge_built(report: &mut Report, output: &Path, work: Work<'_>, clock: &mut Clock) -> Result<()> {
+    let built = files::open(output, work.limits, work.progress)?;
+    let judged = files::look(&built, (work.profile, work.limits), work.progress, clock)?;
+    report.after = Some(judged.before);
+    report.certificate = judged.certificate;
+    if judged.verdict.good {
+        if report.outcome == Outcome::Clean {
+            // Good as it came, and yet other bytes.
+            report.outcome = Outcome::Repaired;
+        }
+        certify(report);
+        return Ok(());
+    }
+    let own = std::mem::take(&mut report.verdict.reasons);
+    report.outcome = Outcome::NotGood;
+    report.verdict = judged.verdict;
+    let all = report.verdict.reasons.iter().map(|reason| format!("all objects as one mesh: {reason}"));
+    report.verdict.reasons = all.chain(own).collect();
+    Ok(())
 }
 
 /// Repairs every object of a package into the new file `output`.

@@ -48,9 +48,13 @@ fn object(id: u32, vertices: &str, triangles: &str) -> String {
 
 /// A package of these objects, with parts that a reader does not know.
 fn package(objects: &[String], others: &[Member]) -> Vec<u8> {
+    package_in("millimeter", objects, others)
+}
+
+fn package_in(unit: &str, objects: &[String], others: &[Member]) -> Vec<u8> {
     let items: String = (1..=objects.len()).map(|id| format!("<item objectid=\"{id}\"/>")).collect();
     let model = format!(
-        "<?xml version=\"1.0\"?>\n<model unit=\"millimeter\" xmlns=\"{CORE}\" xmlns:slic3rpe=\"{PRUSA}\"><resources>{}</resources><build>{items}</build></model>",
+        "<?xml version=\"1.0\"?>\n<model unit=\"{unit}\" xmlns=\"{CORE}\" xmlns:slic3rpe=\"{PRUSA}\"><resources>{}</resources><build>{items}</build></model>",
         objects.concat()
     );
     let relationships = "<Relationships xmlns='http://schemas.openxmlformats.org/package/2006/relationships'>\
@@ -260,4 +264,78 @@ fn new_vertices_of_a_volume_stand_before_those_of_the_next() {
     assert!(*own > 15 && own < next, "{own} {next}");
     assert_eq!(corners.len() - first, 12);
     assert!(corners[..first].iter().all(|(_, attributes)| *attributes == 1), "each part of a coloured triangle is coloured");
+}
+
+/// Two closed boxes far from each other, each a volume of one object; the second one only says where something is cut away.
+fn with_a_negative_volume(names: &[&str]) -> Vec<u8> {
+    let second: String = (0..8).map(corner).map(|[x, y, z]| format!("<vertex x=\"{}\" y=\"{y}\" z=\"{z}\"/>", x + 50)).collect();
+    let mut both = BOX[..11].to_vec();
+    both.extend(BOX.map(|triangle| triangle.map(|k| k + 8)));
+    let config = "<config><object id=\"1\"><volume firstid=\"0\" lastid=\"10\"/><volume firstid=\"11\" lastid=\"22\">\
+        <metadata type=\"volume\" key=\"volume_type\" value=\"NegativeVolume\"/></volume></object></config>";
+    let others: Vec<Member> = names.iter().map(|name| member(name, config)).collect();
+    package(&[object(1, &[vertices(), second].concat(), &triangles(&both, |_| String::new()))], &others)
+}
+
+#[test]
+fn other_formats_hold_parts_of_the_model_alone() {
+    let input = with_a_negative_volume(&["Metadata/Slic3r_PE_model.config"]);
+    for format in [OutputFormat::Stl, OutputFormat::Ply, OutputFormat::Amf] {
+        let repaired = Repaired::of(&input, &Profile { format, ..Profile::default() });
+        let report = &repaired.report;
+        assert_eq!(report.outcome, Outcome::Repaired, "{:?}", report.verdict);
+        assert_eq!(report.output.as_ref().map(|output| output.triangles), Some(12));
+        assert_eq!(report.certificate.as_ref().map(|own| (own.printable, own.triangles)), Some((true, 12)));
+    }
+}
+
+/// The verdict is of the bytes that are written: two objects that are good each may be no solid where they are built.
+#[test]
+fn all_objects_as_one_mesh_are_judged_as_they_are_built() {
+    let input = package(&[1, 2].map(|id| object(id, &vertices(), &triangles(&BOX, |_| String::new()))), &[]);
+    assert_eq!(Repaired::of(&input, &Profile::default()).report.outcome, Outcome::Clean);
+    let repaired = Repaired::of(&input, &Profile { format: OutputFormat::Stl, ..Profile::default() });
+    let report = &repaired.report;
+    assert_eq!((report.outcome, report.verdict.good), (Outcome::NotGood, false));
+    assert!(report.verdict.reasons[0].starts_with("all objects as one mesh: "), "{:?}", report.verdict.reasons);
+    assert!(report.certificate.as_ref().is_some_and(|own| !own.printable));
+}
+
+#[test]
+fn volumes_are_renumbered_wherever_they_stand() {
+    let names = ["Metadata/Slic3r_PE_model.config", "Metadata/SuperSlicer_model.config", "Metadata/Slic3r_model.config"];
+    for names in [&names[..], &names[1..2]] {
+        let repaired = Repaired::of(&with_a_negative_volume(names), &Profile::default());
+        assert_eq!(repaired.report.outcome, Outcome::Repaired, "{:?}", repaired.report.verdict);
+        let limits = Limits { spool: Some(repaired.folder.path().into()), ..Limits::default() };
+        let package = PackageFile::open(&repaired.folder.path().join("out.3mf"), &limits, &Quiet).unwrap().unwrap();
+        assert_eq!(package.configs().len(), names.len());
+        for config in package.configs() {
+            let ranges: Vec<_> = config.volumes.iter().map(|volume| volume.triangles.clone()).collect();
+            assert_eq!(ranges, [0..12, 12..24]);
+        }
+    }
+}
+
+#[test]
+fn an_object_of_blanks_alone_stays() {
+    let input = package(&[object(1, &vertices(), &triangles(&BOX[..11], |_| String::new())), object(2, "\n", "\n")], &[]);
+    let repaired = Repaired::of(&input, &Profile::default());
+    assert_eq!((repaired.report.outcome, repaired.report.objects.len()), (Outcome::Repaired, 1), "{:?}", repaired.report.verdict);
+    assert!(repaired.text().contains(&object(2, "\n", "\n")));
+}
+
+#[test]
+fn amf_has_no_centimetre() {
+    let folder = tempfile::tempdir().unwrap();
+    let (input, output) = (folder.path().join("in.3mf"), folder.path().join("out.amf"));
+    let objects = [object(1, &vertices(), &triangles(&BOX[..11], |_| String::new()))];
+    for (unit, is_made) in [("inch", true), ("centimeter", false)] {
+        std::fs::write(&input, package_in(unit, &objects, &[])).unwrap();
+        let profile = Profile { format: OutputFormat::Amf, ..Profile::default() };
+        let made = repair(&input, &output, &profile, &Limits { threads: 2, ..Limits::default() }, &Quiet);
+        assert_eq!(made.is_ok(), is_made, "{unit}");
+        assert_eq!(output.exists(), is_made);
+        let _ = std::fs::remove_file(&output);
+    }
 }

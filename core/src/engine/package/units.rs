@@ -18,7 +18,7 @@ pub(super) struct UnitOf {
     pub(super) volume: String,
 }
 
-/// The meshes of an object, in the order of its triangles.
+/// The meshes of an object, in the order of its triangles; none of an object without any.
 ///
 /// # Errors
 /// [`Error::Unreadable`] if the object's volumes are not its triangles, one volume after the other, or a triangle has no vertices.
@@ -30,6 +30,10 @@ pub(super) fn of(package: &PackageFile, place: Place, read: &MeshRecords) -> Res
     };
     if read.triangles != count as u64 {
         return Err(refuse("has triangles whose vertices are not there"));
+    }
+    if count == 0 {
+        // Blanks alone stand between the tags.
+        return Ok(Vec::new());
     }
     let volumes = package.volumes_of(place);
     if volumes.is_empty() {

@@ -142,3 +142,33 @@ fn colours_that_are_lost_are_told() {
     let (report, output) = repaired(folder.path(), &input, &profile).unwrap();
     assert!(report.output.is_none() && !output.exists());
 }
+
+/// A face of a vertex that is not there makes it uncertain what belongs together: a person is asked.
+#[test]
+fn objects_that_cannot_be_told_apart_need_review() {
+    let folder = tempfile::tempdir().unwrap();
+    let astray = touching().replacen("</volume>", "<triangle><v1>0</v1><v2>1</v2><v3>999</v3></triangle></volume>", 1);
+    let (report, _) = repaired(folder.path(), &write(folder.path(), &astray), &Profile::default()).unwrap();
+    assert_eq!(report.outcome, Outcome::NeedsReview, "{:?}", report.verdict.reasons);
+}
+
+#[test]
+fn volumes_with_a_role_of_a_slicer_need_review() {
+    let folder = tempfile::tempdir().unwrap();
+    for (kind, outcome) in [("ModelPart", Outcome::Repaired), ("NegativeVolume", Outcome::NeedsReview)] {
+        let role = format!("<volume><metadata type=\"slic3r.volume_type\">{kind}</metadata>");
+        let input = write(folder.path(), &touching().replacen("<volume>", &role, 1));
+        let (report, output) = repaired(folder.path(), &input, &Profile::default()).unwrap();
+        assert_eq!(report.outcome, outcome, "{:?}", report.verdict.reasons);
+        std::fs::remove_file(output).unwrap();
+    }
+}
+
+#[test]
+fn names_stay_whole() {
+    let folder = tempfile::tempdir().unwrap();
+    let long = "the left half of a toy car that has a rather long name - LEFT";
+    let input = write(folder.path(), &touching().replacen("a &amp; b", long, 1));
+    let (_, output) = repaired(folder.path(), &input, &Profile::default()).unwrap();
+    assert_eq!(parts(&read(&output, folder.path()))[0].0, long);
+}

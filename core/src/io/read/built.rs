@@ -13,6 +13,7 @@ use super::limits::most_copies;
 use super::parsed::Parsed;
 use super::rounding::Rounding;
 use super::spool::{Context, Items, Spool};
+use super::threemf::slicer::Volume;
 use super::threemf::{MeshRecords, Model, Object, Place, Transform};
 use crate::contract::error::Result;
 use crate::io::record::{self, Record};
@@ -23,11 +24,16 @@ const PLACED: usize = 16 << 10;
 /// Findings of objects that are told one by one.
 const TOLD: usize = 16;
 
-/// The mesh of a build in a file of so many bytes, of the objects that are `wanted`. Call it within a pool of threads.
+/// The mesh of a build in a file of so many bytes, of the objects that are `wanted`, without those of a slicer's `volumes` that are no part of it. Call it within a pool of threads.
 ///
 /// # Errors
 /// Those of reading an object, [`crate::Error::Unreadable`] without a triangle, [`crate::Error::Refused`] for too many copies.
-pub(super) fn mesh(model: &Model, wanted: fn(&Object) -> bool, bytes: usize, context: &Context<'_>) -> Result<Parsed> {
+pub(super) fn mesh(
+    (model, volumes): (&Model, &[Volume]),
+    wanted: fn(&Object) -> bool,
+    bytes: usize,
+    context: &Context<'_>,
+) -> Result<Parsed> {
     let mut times: HashMap<Place, u64> = HashMap::new();
     each(model, wanted, |place, _| {
         *times.entry(place).or_default() += 1;
@@ -40,7 +46,10 @@ pub(super) fn mesh(model: &Model, wanted: fn(&Object) -> bool, bytes: usize, con
     again.sort_unstable();
     for (place, times) in again {
         let from = kept.count() as usize;
-        kept.append(reading.read(place)?.parsed.records.all())?;
+        let records = reading.read(place)?.parsed.records;
+        for range in parts(model, volumes, place, records.all().len()) {
+            kept.append(records.all().get(range).unwrap_or_default())?;
+        }
         let here = from..kept.count() as usize;
         copies = copies.saturating_add((times - 1).saturating_mul(here.len() as u64));
         where_kept.insert(place, here);
@@ -55,7 +64,9 @@ pub(super) fn mesh(model: &Model, wanted: fn(&Object) -> bool, bytes: usize, con
         Some(range) => placing.add(&kept, range.clone(), transform),
         None => {
             let records = reading.read(place)?.parsed.records;
-            placing.add(&records, 0..records.all().len(), transform)
+            parts(model, volumes, place, records.all().len())
+                .into_iter()
+                .try_for_each(|range| placing.add(&records, range, transform))
         }
     })?;
     let Placing { spool, rounding, .. } = placing;
@@ -64,14 +75,40 @@ pub(super) fn mesh(model: &Model, wanted: fn(&Object) -> bool, bytes: usize, con
     }
     Ok(Parsed {
         records: spool.map()?,
-        findings: [model.findings.clone(), reading.findings()].concat(),
+        findings: [model.findings.clone(), reading.findings(), left_out(volumes)].concat(),
         header: binary::header_of(b""),
         rounding: rounding.if_any(),
         unit: Some(model.unit().name()),
         positions: None,
         coloured: false,
         parts: Vec::new(),
+        doubt: None,
     })
+}
+
+/// The triangles of an object that are parts of the model, where a slicer's volumes are all of its triangles, one behind the other; else all.
+fn parts(model: &Model, volumes: &[Volume], place: Place, triangles: usize) -> Vec<Range<usize>> {
+    let id = model.object(place).map(|object| object.id).filter(|_| place.part == 0);
+    let own = || volumes.iter().filter(|volume| Some(volume.object) == id);
+    let mut end = 0;
+    let follows = |volume: &Volume| std::mem::replace(&mut end, volume.triangles.end) == volume.triangles.start;
+    let fits = own().all(follows) && end == triangles as u64;
+    if !fits {
+        return vec![0..triangles];
+    }
+    own().filter(|volume| volume.is_part).map(|volume| volume.triangles.start as usize..volume.triangles.end as usize).collect()
+}
+
+/// Tells of volumes that only say where settings hold, or what is cut away.
+fn left_out(volumes: &[Volume]) -> Vec<Finding> {
+    let count = volumes.iter().filter(|volume| !volume.is_part).count() as u64;
+    let of = Counted(
+        count,
+        "volume of a slicer's that is no part of the model, left out",
+        "volumes of a slicer's that are no parts of the model, left out",
+    );
+    let text = of.to_string();
+    (count > 0).then(|| Finding { harmless: true, ..Finding::flaw(text) }).into_iter().collect()
 }
 
 /// Calls `place` for each object that is wanted, where it is built, until it fails.

@@ -45,6 +45,7 @@ pub struct MeshFile {
     positions: Option<Positions>,
     coloured: bool,
     parts: Vec<Part>,
+    doubt: Option<&'static str>,
 }
 
 /// What the bytes of a file hold.
@@ -57,6 +58,7 @@ pub(super) struct Content {
     positions: Option<Positions>,
     coloured: bool,
     parts: Vec<Part>,
+    doubt: Option<&'static str>,
 }
 
 impl Content {
@@ -80,6 +82,7 @@ impl Content {
                     positions: None,
                     coloured: false,
                     parts: Vec::new(),
+                    doubt: None,
                 })
             }
             sniff::Kind::Text(sniff::Text { start, mut findings }) => {
@@ -129,7 +132,7 @@ impl Content {
 
     /// `findings`: those of the bytes themselves.
     fn parsed(parsed: Parsed, format: Format, findings: Vec<Finding>) -> Self {
-        let Parsed { records, findings: mut found, header, rounding, unit, positions, coloured, parts } = parsed;
+        let Parsed { records, findings: mut found, header, rounding, unit, positions, coloured, parts, doubt } = parsed;
         found.extend(rounding.map(Rounding::finding));
         Self {
             source: Source::Spooled(records),
@@ -140,6 +143,7 @@ impl Content {
             positions,
             coloured,
             parts,
+            doubt,
         }
     }
 }
@@ -157,8 +161,21 @@ impl MeshFile {
         let (opened, input) = Opened::bytes(path, spool, limits, progress)?;
         let kind = sniff::sniff(&input).map_err(|rejection| rejection.at(path))?;
         let content = Content::of(kind, &input, &Context { path, spool, limits, progress, passed: None })?;
-        let Content { source, format, findings, header, unit, positions, coloured, parts } = content;
-        Ok(Self { opened, name: path.to_owned(), input, source, format, findings, header, unit, positions, coloured, parts })
+        let Content { source, format, findings, header, unit, positions, coloured, parts, doubt } = content;
+        Ok(Self {
+            opened,
+            name: path.to_owned(),
+            input,
+            source,
+            format,
+            findings,
+            header,
+            unit,
+            positions,
+            coloured,
+            parts,
+            doubt,
+        })
     }
 
     /// The triangles in input order, those with NaN or infinite coordinates included.
@@ -249,6 +266,11 @@ impl MeshFile {
     /// Meshes that are never welded to each other, one behind the other, all triangles in them; none where all of it is one mesh.
     pub(crate) fn parts(&self) -> &[Part] {
         &self.parts
+    }
+
+    /// A person should look at a result that is no copy, for this reason.
+    pub(crate) fn doubt(&self) -> Option<&'static str> {
+        self.doubt
     }
 
     /// It has colours or materials in a form that no result keeps.

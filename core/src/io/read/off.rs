@@ -60,6 +60,7 @@ pub(super) fn read(bytes: &[u8], context: &Context<'_>) -> Result<Parsed> {
         positions,
         coloured: false,
         parts: Vec::new(),
+        doubt: None,
     })
 }
 

@@ -8,7 +8,7 @@ use super::archive::Archive;
 use super::finding::{Finding, Rejection};
 use super::opened::Opened;
 use super::spool::Context;
-use super::threemf::slicer::{self, Volume};
+use super::threemf::slicer::{self, Config, Volume};
 use super::threemf::{Content, MeshRecords, Model, Object, Place, Purpose};
 use crate::contract::error::Result;
 use crate::contract::progress::Progress;
@@ -25,9 +25,8 @@ pub(crate) struct PackageFile {
     path: PathBuf,
     input: Bytes,
     model: Model,
-    /// The part of a slicer's project that says which triangles are volumes: the number of its entry, and its text.
-    config: Option<(usize, Vec<u8>)>,
-    volumes: Vec<Volume>,
+    /// The parts of a slicer's project that say which triangles are volumes.
+    configs: Vec<Config>,
     findings: Vec<Finding>,
 }
 
@@ -58,14 +57,9 @@ impl PackageFile {
             return Ok(None);
         }
         let model = parallel::in_pool(limits.threads, || Model::open(&input, &context))?;
-        let entry = archive.entries.iter().position(|entry| entry.name == slicer::CONFIG);
-        let config = match entry.and_then(|number| Some((number, archive.entries.get(number)?))) {
-            Some((number, entry)) => Some((number, archive.small(entry, &context)?)),
-            None => None,
-        };
-        let volumes = config.as_ref().map_or(Ok(Vec::new()), |(_, text)| slicer::volumes(text)).map_err(reject)?;
+        let configs = slicer::configs(&archive, &context)?;
         let findings = [model.findings.clone(), left_alone(&model)].concat();
-        Ok(Some(Self { opened, path: path.to_owned(), input, model, config, volumes, findings }))
+        Ok(Some(Self { opened, path: path.to_owned(), input, model, configs, findings }))
     }
 
     /// The objects that are repaired: meshes of triangles that are printed, in the order of the parts and of their texts.
@@ -124,23 +118,23 @@ impl PackageFile {
 
     /// All volumes of the slicer's, in the order of its text.
     pub(crate) fn volumes(&self) -> &[Volume] {
-        &self.volumes
+        self.configs.first().map_or(&[], |config| config.volumes.as_slice())
     }
 
     /// The numbers of an object's volumes. They are of objects of the first part.
     pub(crate) fn volumes_at(&self, place: Place) -> Vec<usize> {
         let id = self.model.object(place).map(|object| object.id).filter(|_| place.part == 0);
-        (0..self.volumes.len()).filter(|k| self.volumes.get(*k).map(|volume| volume.object) == id).collect()
+        (0..self.volumes().len()).filter(|k| self.volumes().get(*k).map(|volume| volume.object) == id).collect()
     }
 
     /// An object's volumes.
     pub(crate) fn volumes_of(&self, place: Place) -> Vec<&Volume> {
-        self.volumes_at(place).into_iter().filter_map(|k| self.volumes.get(k)).collect()
+        self.volumes_at(place).into_iter().filter_map(|k| self.volumes().get(k)).collect()
     }
 
-    /// The number of the entry that holds the volumes, and its text.
-    pub(crate) fn config(&self) -> Option<(usize, &[u8])> {
-        self.config.as_ref().map(|(entry, text)| (*entry, text.as_slice()))
+    /// The parts that hold the volumes.
+    pub(crate) fn configs(&self) -> &[Config] {
+        &self.configs
     }
 
     /// The name of the unit of all coordinates.

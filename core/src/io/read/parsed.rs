@@ -35,4 +35,6 @@ pub(crate) struct Parsed {
     pub(crate) coloured: bool,
     /// Meshes that are never welded to each other, one behind the other, all triangles in them; none where all of the file is one mesh.
     pub(crate) parts: Vec<Part>,
+    /// A person should look at a result that is no copy, for this reason.
+    pub(crate) doubt: Option<&'static str>,
 }

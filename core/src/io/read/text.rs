@@ -35,7 +35,17 @@ pub(super) fn read(text: &[u8], start: usize, context: &Context<'_>) -> Result<P
     context.in_order(text.len() as u64, next, parse, take)?;
     judge(&tally, spool.count()).map_err(reject)?;
     let (records, findings, header) = (spool.map()?, findings(&tally), header(&tally));
-    Ok(Parsed { records, findings, header, rounding: None, unit: None, positions: None, coloured: false, parts: Vec::new() })
+    Ok(Parsed {
+        records,
+        findings,
+        header,
+        rounding: None,
+        unit: None,
+        positions: None,
+        coloured: false,
+        parts: Vec::new(),
+        doubt: None,
+    })
 }
 
 /// Bytes of records that a text will make, if it goes on as it begins.

@@ -4,7 +4,7 @@ use super::archive::{Archive, shown};
 use super::finding::Rejection;
 use super::parsed::Parsed;
 use super::spool::Context;
-use super::threemf::Model;
+use super::threemf::{Model, slicer};
 use super::{amf, built, package_file};
 use crate::contract::error::Result;
 use crate::contract::report::Format;
@@ -17,7 +17,9 @@ pub(super) fn read(bytes: &[u8], context: &Context<'_>) -> Result<(Parsed, Forma
     let archive = Archive::open(bytes).map_err(|rejection| rejection.at(context.path))?;
     if archive.find(package_file::CONTENT_TYPES).is_some() {
         let model = Model::open(bytes, context)?;
-        return Ok((built::mesh(&model, package_file::is_repaired, bytes.len(), context)?, Format::ThreeMf));
+        let configs = slicer::configs(&archive, context)?;
+        let volumes = configs.first().map_or(&[][..], |config| config.volumes.as_slice());
+        return Ok((built::mesh((&model, volumes), package_file::is_repaired, bytes.len(), context)?, Format::ThreeMf));
     }
     let is_amf = |name: &str| name.to_ascii_lowercase().ends_with(".amf");
     let files: Vec<_> = archive.entries.iter().filter(|entry| !entry.is_folder()).collect();

@@ -69,6 +69,11 @@ impl<'a> Ply<'a> {
             }
         }
         let (vertices, faces) = (vertices?, faces?);
+        // New positions are fractions, for which whole numbers have no place.
+        let is_whole = |step: &Step| matches!(step, Step::Coordinate(_, kind) if !matches!(kind, Scalar::F32 | Scalar::F64));
+        if vertices.layout.steps().iter().any(is_whole) {
+            return None;
+        }
         let mixes: Vec<Mix> = vertices.element.properties.iter().map(mix).collect();
         let carries = says_more(bytes);
         Some(Self { bytes, form, head: header.end, vertices, faces, positions, mixes, carries })

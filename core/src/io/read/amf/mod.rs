@@ -97,16 +97,38 @@ pub(super) fn read(text: &[u8], bytes: usize, context: &Context<'_>) -> Result<P
     // What is left of a file may be half a mesh: then nobody knows what belongs together.
     let is_whole = findings.iter().all(|finding| finding.loss == Loss::None);
     let parts = if is_whole && placed.parts.len() > 1 { parts(&document, &placed.parts) } else { Vec::new() };
-    findings.extend(of_objects(&document, !parts.is_empty()).filter(|_| placed.objects > 1));
+    let united = parts.is_empty() && placed.several;
+    findings.extend(of_objects(&document, &placed, united));
     let (records, rounding) = (placed.records, placed.rounding.if_any());
     let coloured = document.is_coloured || notes.colours > 0;
-    Ok(Parsed { records, findings, header, rounding, unit: unit_of(&document), positions: None, coloured, parts })
+    Ok(Parsed {
+        records,
+        findings,
+        header,
+        rounding,
+        unit: unit_of(&document),
+        positions: None,
+        coloured,
+        parts,
+        doubt: doubt(united, notes.roles),
+    })
+}
+
+/// Why somebody should look at a repair of such a file.
+fn doubt(united: bool, roles: u64) -> Option<&'static str> {
+    match (united, roles) {
+        (_, 1..) => Some(
+            "modifiers, negative volumes or supports of a slicer become parts of the model: no result in AMF keeps their roles",
+        ),
+        (true, 0) => Some("its objects could not be repaired one by one: two that touch may be one body now"),
+        (false, 0) => None,
+    }
 }
 
 /// The meshes of a file by their names.
 fn parts(document: &Document, parts: &[PartOf]) -> Vec<Part> {
     let named = |part: &PartOf| {
-        let own = document.titles.get(part.object).map(|name| shown(name)).unwrap_or_default();
+        let own = document.titles.get(part.object).map(|name| title(name)).unwrap_or_default();
         let volumes = document.meshes(part.object).iter().filter(|mesh| !mesh.indices.is_empty()).count();
         let name = if volumes > 1 { format!("{own} volume {}", part.mesh + 1) } else { own };
         Part { name: name.trim().into(), triangles: part.triangles.clone() }
@@ -180,6 +202,10 @@ fn of_text(document: &Document, notes: &Notes, behind: &[u8]) -> Vec<Finding> {
         let (normals, edges) = (Counted(notes.normals, "normal", "normals"), Counted(notes.edges, "edge", "edges"));
         found.push(harmless(format!("triangles curved by {normals} and {edges}, read flat")));
     }
+    if notes.roles > 0 {
+        let volumes = Counted(notes.roles, "volume is a modifier", "volumes are modifiers");
+        found.push(harmless(format!("{volumes}, negative or support to a slicer, read as mesh")));
+    }
     if document.supports > 0 {
         let volumes = Counted(document.supports, "volume", "volumes");
         found.push(harmless(format!("{volumes} of support material, read as mesh")));
@@ -216,18 +242,25 @@ fn of_placement(document: &Document, names: &Names, placed: &Placed) -> Vec<Find
     found
 }
 
-/// The objects of a file that places several. `are_apart`: they are repaired one by one.
-fn of_objects(document: &Document, are_apart: bool) -> Option<Finding> {
+/// The objects of a file of several meshes. `united`: they are read as one.
+fn of_objects(document: &Document, placed: &Placed, united: bool) -> Option<Finding> {
     let holding = |object: &usize| document.meshes(*object).iter().any(|mesh| !mesh.indices.is_empty());
     let all = (0..document.objects.len()).filter(holding).count();
     let names: Vec<_> = document.names.iter().take(SHOWN).map(|name| shown(name)).collect();
     let more = if document.objects.len() > SHOWN { ", …" } else { "" };
-    let end = if are_apart { "" } else { ", read as one mesh" };
-    (all > 1).then(|| harmless(format!("{} objects ({}{more}){end}", Count(all as u64), names.join(", "))))
+    let end = if united { ": their meshes are read as one" } else { "" };
+    let objects = Counted(all as u64, "object", "objects");
+    (united || all > 1 && placed.several).then(|| harmless(format!("{objects} ({}{more}){end}", names.join(", "))))
 }
 
 fn harmless(text: String) -> Finding {
     Finding { harmless: true, ..Finding::flaw(text) }
+}
+
+/// A name as a result has it, without control characters. Bytes that are no UTF-8 are of Latin-1, as old programs write.
+fn title(text: &[u8]) -> String {
+    let text = String::from_utf8(text.to_vec()).unwrap_or_else(|_| text.iter().map(|byte| char::from(*byte)).collect());
+    text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect()
 }
 
 /// Text of a file for people: short, and without control characters.

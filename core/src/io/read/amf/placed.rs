@@ -29,6 +29,8 @@ pub(super) struct Placed {
     pub(super) objects: u64,
     /// Their meshes, in the order of the records; none of more than [`MOST_PARTS`].
     pub(super) parts: Vec<PartOf>,
+    /// There is more than one such mesh.
+    pub(super) several: bool,
 }
 
 /// A mesh that is placed.
@@ -114,10 +116,11 @@ pub(super) fn place(
     })?;
     placing.flush()?;
     let Placing { spool, tally, rounding, objects, mut parts, .. } = placing;
+    let several = parts.len() > 1;
     if parts.len() > MOST_PARTS {
         parts.clear();
     }
-    Ok(Placed { records: spool.map()?, tally, rounding, objects, parts })
+    Ok(Placed { records: spool.map()?, tally, rounding, objects, parts, several })
 }
 
 enum Stop {

@@ -57,6 +57,8 @@ pub(super) struct Notes {
     pub(super) edges: u64,
     /// Colours and places in textures.
     pub(super) colours: u64,
+    /// Volumes that are no part of the model to a slicer.
+    pub(super) roles: u64,
     /// [`POINT`] and [`COMMA`], as they were seen.
     pub(super) separators: u8,
 }
@@ -70,6 +72,7 @@ impl Notes {
         self.normals += behind.normals;
         self.edges += behind.edges;
         self.colours += behind.colours;
+        self.roles += behind.roles;
         self.separators |= behind.separators;
     }
 
@@ -161,6 +164,11 @@ impl Stretch {
                 (Kind::Vertices, b"edge") => {
                     tokens.skip()?;
                     self.notes.edges += 1;
+                }
+                (Kind::Triangles, b"metadata") => {
+                    let of = tag.attribute(b"type", LONGEST_NUMBER).unwrap_or_default();
+                    let value = tokens.content(LONGEST_NUMBER)?;
+                    self.notes.roles += u64::from(is_role(&of, value.trim_ascii()));
                 }
                 _ => {
                     self.notes.colours += u64::from(is_colour(tag.name));
@@ -269,6 +277,15 @@ impl Stretch {
 /// An element that colours what it stands in (ISO/ASTM 52915, section 6.5 and 6.6).
 pub(super) fn is_colour(name: &[u8]) -> bool {
     matches!(name, b"color" | b"texmap" | b"map")
+}
+
+/// Says this metadatum of a volume that it is no part of the model? (PrusaSlicer's `src/libslic3r/Format/AMF.cpp`, `amf_volume`.)
+fn is_role(of: &[u8], value: &[u8]) -> bool {
+    match of {
+        b"slic3r.volume_type" => !matches!(value, b"ModelPart" | b""),
+        b"slic3r.modifier" => value == b"1",
+        _ => false,
+    }
 }
 
 /// Reads the element `coordinates` that has begun.

@@ -311,7 +311,10 @@ fn vertices_without_triangles_and_empty_meshes_take_no_time_for_each_instance() 
     let file = open(amf(&(content + &many)).as_bytes()).unwrap();
     assert_eq!(file.records().len(), 20_000);
     assert!(file.records().iter().all(|record| corners(record) == FLAT.map(|[x, y, z]| [x + 1.0, y, z])));
-    assert_eq!(texts(&file), ["1 constellation of 20 000 instances: 20 000 objects placed"]);
+    assert_eq!(
+        texts(&file),
+        ["1 constellation of 20 000 instances: 20 000 objects placed", "1 object (o): their meshes are read as one"]
+    );
 }
 
 /// Some windows of text, in which comments as long as a hundred vertices hold vertices that are none: guesses of where a child begins go astray.
@@ -363,7 +366,7 @@ fn many_small_objects_keep_their_order() {
     let file = open(amf(&text).as_bytes()).unwrap();
     assert_eq!(file.records().len(), count);
     assert!(file.records().iter().enumerate().all(|(k, record)| corners(record)[0][0] == k as f32));
-    assert_eq!(texts(&file), ["5 000 objects (0, 1, 2, 3, 4, …), read as one mesh"]);
+    assert_eq!(texts(&file), ["5 000 objects (0, 1, 2, 3, 4, …): their meshes are read as one"]);
 }
 
 /// A vertex or triangle in one of several writers' hands, with the same meaning.

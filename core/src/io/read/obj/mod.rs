@@ -127,7 +127,17 @@ pub(super) fn read(bytes: &[u8], start: usize, context: &Context<'_>) -> Result<
     findings.extend(tally.findings());
     let (header, rounding) = (header(&found), found.rounding.if_any());
     let positions = Some(Positions::Spooled(positions));
-    Ok(Parsed { records: records.map()?, findings, header, rounding, unit: None, positions, coloured: false, parts: Vec::new() })
+    Ok(Parsed {
+        records: records.map()?,
+        findings,
+        header,
+        rounding,
+        unit: None,
+        positions,
+        coloured: false,
+        parts: Vec::new(),
+        doubt: None,
+    })
 }
 
 fn windows_at_a_time() -> usize {

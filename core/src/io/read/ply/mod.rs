@@ -209,6 +209,7 @@ impl<'a> Reading<'a, '_> {
             positions: Some(positions),
             coloured: false,
             parts: Vec::new(),
+            doubt: None,
         })
     }
 }

@@ -77,6 +77,7 @@ impl Model {
             positions: None,
             coloured: false,
             parts: Vec::new(),
+            doubt: None,
         };
         let TriangleCounts { tally, with_any, .. } = told;
         Ok(MeshRecords { parsed, positions, triangles: tally.faces, with_any })

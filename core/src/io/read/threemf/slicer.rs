@@ -1,6 +1,6 @@
 //! Volumes of PrusaSlicer's projects: stretches of an object's triangles that are bodies of their own.
 //!
-//! They stand in `Metadata/Slic3r_PE_model.config`: a `<volume firstid= lastid=>` for each, within the `<object id=>` (PrusaSlicer's
+//! They stand in `Metadata/Slic3r_PE_model.config`, or a part of another name: a `<volume firstid= lastid=>` for each, within the `<object id=>` (PrusaSlicer's
 //! `src/libslic3r/Format/3mf.cpp`, `_add_model_config_file_to_archive`). A volume is a part of the model or something that only tells the slicer
 //! where settings hold (`volume_type`, in old files `modifier`).
 
@@ -9,11 +9,14 @@ use std::ops::Range;
 use quick_xml::Reader;
 use quick_xml::events::{BytesStart, Event};
 
-use super::super::archive::shown;
+use super::super::archive::{Archive, shown};
 use super::super::finding::Rejection;
+use super::super::spool::Context;
+use crate::contract::error::Result;
 
-/// The name of the part.
-pub(crate) const CONFIG: &str = "Metadata/Slic3r_PE_model.config";
+/// The names of such parts, as PrusaSlicer, SuperSlicer and Slic3r write them; SuperSlicer writes all three.
+const CONFIGS: [&str; 3] =
+    ["Metadata/Slic3r_PE_model.config", "Metadata/SuperSlicer_model.config", "Metadata/Slic3r_model.config"];
 /// Most volumes of a package.
 const MOST_VOLUMES: usize = 1 << 16;
 
@@ -30,12 +33,41 @@ pub(crate) struct Volume {
     pub(crate) places: [Range<usize>; 2],
 }
 
-/// The volumes of all objects, in the order of the text. O(n) in it.
+/// A part that says which triangles are volumes.
+pub(crate) struct Config {
+    /// The number of its entry in the archive.
+    pub(crate) entry: usize,
+    pub(crate) text: Vec<u8>,
+    pub(crate) volumes: Vec<Volume>,
+}
+
+/// All such parts of a package; they have the same volumes.
+///
+/// # Errors
+/// Those of reading, of [`volumes`], and a refusal of two that differ.
+pub(crate) fn configs(archive: &Archive<'_>, context: &Context<'_>) -> Result<Vec<Config>> {
+    let mut all: Vec<Config> = Vec::new();
+    for name in CONFIGS {
+        let found = archive.entries.iter().enumerate().find(|(_, entry)| entry.name == name);
+        let Some((number, entry)) = found else { continue };
+        let text = archive.small(entry, context)?;
+        let volumes = volumes(name, &text).map_err(|rejection| rejection.at(context.path))?;
+        let triangles = |volumes: &[Volume]| volumes.iter().map(|of| (of.object, of.triangles.clone())).collect::<Vec<_>>();
+        if all.first().is_some_and(|first| triangles(&first.volumes) != triangles(&volumes)) {
+            let reason = format!("{name}: has other volumes than another part of the package");
+            return Err(Rejection::Unreadable(reason).at(context.path));
+        }
+        all.push(Config { entry: number, text, volumes });
+    }
+    Ok(all)
+}
+
+/// The volumes of all objects in the part of this name, in the order of the text. O(n) in it.
 ///
 /// # Errors
 /// What is wrong with the text, or a stretch that ends before it begins.
-pub(crate) fn volumes(text: &[u8]) -> Result<Vec<Volume>, Rejection> {
-    let refuse = |reason: String| Rejection::Unreadable(format!("{CONFIG}: {reason}"));
+pub(crate) fn volumes(name: &str, text: &[u8]) -> std::result::Result<Vec<Volume>, Rejection> {
+    let refuse = |reason: String| Rejection::Unreadable(format!("{name}: {reason}"));
     let text = std::str::from_utf8(text).map_err(|_| refuse("is no UTF-8".into()))?;
     let mut reader = Reader::from_str(text);
     let (mut all, mut object): (Vec<Volume>, Option<u32>) = (Vec::new(), None);
@@ -133,7 +165,7 @@ mod tests {
 
     #[test]
     fn stretches_of_triangles_are_read_and_written() {
-        let all = volumes(TEXT.as_bytes()).unwrap();
+        let all = volumes("a", TEXT.as_bytes()).unwrap();
         let said: Vec<_> = all.iter().map(|volume| (volume.object, volume.triangles.clone(), volume.is_part)).collect();
         assert_eq!(said, [(4, 0..12, true), (4, 12..100, false)]);
         let text = renumbered(TEXT.as_bytes(), &all, &[0..9, 9..97]);
@@ -149,8 +181,8 @@ mod tests {
             "<!DOCTYPE a><config/>",
             "<config><a></b>",
         ] {
-            assert!(volumes(text.as_bytes()).is_err(), "{text}");
+            assert!(volumes("a", text.as_bytes()).is_err(), "{text}");
         }
-        assert_eq!(volumes(b"<config><object id='1'/></config>").unwrap(), []);
+        assert_eq!(volumes("a", b"<config><object id='1'/></config>").unwrap(), []);
     }
 }

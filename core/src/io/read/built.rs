@@ -94,7 +94,7 @@ fn parts(model: &Model, volumes: &[Volume], place: Place, triangles: usize) -> V
     let follows = |volume: &Volume| std::mem::replace(&mut end, volume.triangles.end) == volume.triangles.start;
     let fits = own().all(follows) && end == triangles as u64;
     if !fits {
-        return vec![0..triangles];
+        return std::iter::once(0..triangles).collect();
     }
     own().filter(|volume| volume.is_part).map(|volume| volume.triangles.start as usize..volume.triangles.end as usize).collect()
 }

@@ -197,7 +197,7 @@ pub(crate) fn convert(
     let written = match target.layout {
         Some(layout) if !target.is_input => {
             refuse_infinite(&mesh)?;
-            refuse_unit(&mesh, layout)?;
+            refuse_unit(input, mesh.unit(), format)?;
             let work = Work { profile: &Profile::default(), limits, progress };
             encode((&mesh, mesh.parts(), input), output, layout, work, &mut Clock::start())?
         }
@@ -217,12 +217,12 @@ pub(crate) fn convert(
 }
 
 /// AMF has no centimetre (ISO/ASTM 52915:2020, section 5.2): its readers would take other lengths.
-fn refuse_unit(mesh: &MeshFile, layout: Layout) -> Result<()> {
-    if !matches!(layout, Layout::Amf(_)) || mesh.unit() != Some("centimeter") {
+pub(crate) fn refuse_unit(path: &Path, unit: Option<&str>, format: OutputFormat) -> Result<()> {
+    if format != OutputFormat::Amf || unit != Some("centimeter") {
         return Ok(());
     }
     Err(Error::Refused {
-        path: mesh.path().into(),
+        path: path.into(),
         reason: "coordinates in centimetres, a unit that AMF does not have".into(),
         advice: "take 3MF for the result".into(),
     })

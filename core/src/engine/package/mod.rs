@@ -67,6 +67,7 @@ pub(crate) fn repair_as(package: &PackageFile, output: &Path, work: Work<'_>, cl
     if matches!(work.profile.format, OutputFormat::Input | OutputFormat::ThreeMf) {
         return repair(package, output, work, clock);
     }
+    formats::refuse_unit(package.path(), Some(package.unit()), work.profile.format)?;
     let spool = Nameless::new(work.limits)?;
     let mut report = repair(package, &spool.path(), work, clock)?;
     if report.output.is_some() {

@@ -335,6 +335,7 @@ fn amf_has_no_centimetre() {
         let profile = Profile { format: OutputFormat::Amf, ..Profile::default() };
         let made = repair(&input, &output, &profile, &Limits { threads: 2, ..Limits::default() }, &Quiet);
         assert_eq!(made.is_ok(), is_made, "{unit}");
+        assert!(made.err().is_none_or(|error| error.to_string().contains("in.3mf")), "it is named as it was given");
         assert_eq!(output.exists(), is_made);
         let _ = std::fs::remove_file(&output);
     }

@@ -88,17 +88,18 @@ pub(crate) fn repair(
 fn is_written(mesh: &MeshFile, is_copy: bool, differ: bool, report: &mut Report, work: Work<'_>) -> bool {
     let triangles = mesh.records().len() as u64;
     if !matches!(Said::by(mesh), Said::Nothing) {
-        let lost = Account { lost: triangles, ..Account::default() };
-        let account = if is_copy { Account { kept: triangles, ..Account::default() } } else { lost };
+        let (kept, lost) = if is_copy { (triangles, 0) } else { (0, triangles) };
+        let account = Account { kept, lost, ..Account::default() };
         report.attributes = Some(account.told());
         if !carried::heed(report, work.profile, carried::harm(account)) {
             return false;
         }
     }
-    if !is_copy && report.outcome == Outcome::Clean {
-        report.outcome = Outcome::Repaired;
-    }
     if !is_copy {
+        if report.outcome == Outcome::Clean {
+            // Good as it came, and yet other bytes.
+            report.outcome = Outcome::Repaired;
+        }
         carried::ask_if_doubtful(report, mesh.doubt());
     }
     // Good as it came; or not good, and what could be repaired of it is.

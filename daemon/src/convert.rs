@@ -18,11 +18,14 @@ use crate::units::{WRITTEN, show_size};
 /// Writes what the command line asks for.
 pub(crate) fn run(args: &ConvertArgs) -> Exit {
     match convert(args) {
-        Ok(Converted { input, output, .. }) => {
+        Ok(Converted { input, output, attributes_lost, .. }) => {
             let of = |facts: &FileFacts| format!("{}, {}", show_size(facts.bytes), format_name(facts.format));
             let (from, to) = (args.input.display(), args.output.display());
             let first = format!("{from}: {}, {} -> {to}: {}", words::triangles(input.triangles), of(&input), of(&output));
-            let lines = std::iter::once(first).chain(input.findings.iter().map(|finding| format!("  {finding}")));
+            let lost = (attributes_lost > 0)
+                .then(|| format!("  lost: colours, paint or other attributes of {}", words::triangles(attributes_lost)));
+            let findings = input.findings.iter().map(|finding| format!("  {finding}"));
+            let lines = std::iter::once(first).chain(findings).chain(lost);
             let text: String = lines.map(|line| plain(&line) + "\n").collect();
             print(text.as_bytes(), Exit::Good)
         }

@@ -22,12 +22,24 @@ pub(crate) fn repair(args: &RepairArgs) -> Exit {
         profile.guarantee = args.guarantee.map_or(profile.guarantee, Into::into);
         let of_name = || args.output.extension().and_then(|ending| OutputFormat::of_ending(ending.to_str()?));
         let is_folder = fsx::is_folder(&args.output).unwrap_or(false);
-        profile.format = args.format.or_else(|| of_name().filter(|_| !is_folder)).unwrap_or(profile.format);
+        let of_name = of_name().filter(|_| !is_folder);
+        if let (Some(wanted), Some(ending)) = (args.format, of_name) {
+            agree(wanted, ending, &args.output)?;
+        }
+        profile.format = args.format.or(of_name).unwrap_or(profile.format);
         let naming = Some(Naming::new(args, profile.format)?);
         let limits = args.spend.limits(args.list_edit);
         Ok(Order { inputs: &args.inputs, profile, limits, naming, certificate: None, json: args.json })
     });
     carry_out(order)
+}
+
+/// The format that is asked for is that of the output's ending.
+fn agree(wanted: OutputFormat, ending: OutputFormat, output: &Path) -> Result<(), String> {
+    if wanted == ending || wanted == OutputFormat::Input {
+        return Ok(());
+    }
+    Err(format!("{}: `--format` wants another format than its ending says; change one of them", output.display()))
 }
 
 /// Diagnoses every input, or checks the certificate of one.

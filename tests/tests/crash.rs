@@ -21,6 +21,7 @@ use std::os::unix::process::ExitStatusExt;
 use std::process::{Child, Command, ExitStatus};
 use std::time::{Duration, Instant};
 
+use serde_json::Value;
 use suture_bench::generate::Case;
 use suture_tests::Place;
 use suture_tests::binary::with_crash_points;
@@ -293,10 +294,17 @@ fn f02_killed_at_random() {
     assert_eq!(hot.tree("done"), originals);
     let out: Tree = hot.tree("out").into_iter().filter(|(name, _)| !name.ends_with(".json")).collect();
     assert_eq!(out, originals, "clean files appear byte for byte, once each");
+    assert_eq!(listed_twice(&hot.jobs()), Vec::<String>::new(), "seed {seed}");
     assert_eq!(hot.jobs().len(), originals.len());
     assert!(hot.tree("quarantine").is_empty() && hot.tree("failed").is_empty(), "seed {seed}: an innocent file");
     assert_at_rest(&hot, "random kills");
     println!("seed {seed}: {kills} kills over {} drops in {:.0} s", originals.len(), started.elapsed().as_secs_f64());
+}
+
+/// Jobs of files that have more than one, whole.
+fn listed_twice(jobs: &[Value]) -> Vec<String> {
+    let is_twice = |job: &&Value| jobs.iter().filter(|other| other["source"]["path"] == job["source"]["path"]).count() > 1;
+    jobs.iter().filter(is_twice).map(Value::to_string).collect()
 }
 
 /// F10, F11 and F12: files that abort their worker, hang in it, eat its memory, try to kill the daemon (which their worker may not), or whose

@@ -34,6 +34,9 @@ pub struct Converted {
     pub input: FileFacts,
     /// The file written.
     pub output: FileFacts,
+    /// Triangles of the input whose colours, paint or other attributes the output does not hold.
+    #[serde(default)]
+    pub attributes_lost: u64,
 }
 
 fn lossy<S: Serializer>(path: &Path, serializer: S) -> Result<S::Ok, S::Error> {

@@ -21,7 +21,7 @@ pub(crate) fn account(said: &Said<'_>, planned: Option<&Planned<'_>>, triangles:
     match (said, planned) {
         (Said::Nothing, _) => None,
         (_, Some(planned)) => Some(planned.account),
-        (_, None) => Some(Account { lost: triangles as u64, ..Account::default() }),
+        (said, None) => Some(Account { lost: said.triangles(triangles), ..Account::default() }),
     }
 }
 

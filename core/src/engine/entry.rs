@@ -28,7 +28,7 @@ pub(crate) fn inspect(input: &Path, profile: &Profile, limits: &Limits, progress
     }
     let mesh = files::open(input, limits, progress)?;
     clock.stage("read");
-    let report = if mesh.parts().is_empty() {
+    let report = if mesh.parts().len() < 2 {
         files::look(&mesh, (profile, limits), progress, &mut clock)?
     } else {
         parts::inspect(&mesh, Work { profile, limits, progress }, &mut clock)?
@@ -53,7 +53,7 @@ pub(crate) fn repair(input: &Path, output: &Path, profile: &Profile, limits: &Li
     let triangles = mesh.records().len();
     let target = formats::target(mesh.format(), mesh.unit(), profile.format);
     let report = match target.layout {
-        _ if !mesh.parts().is_empty() => {
+        _ if mesh.parts().len() > 1 => {
             clock.stage("read");
             parts::repair((&mesh, input), output, target, Work { profile, limits, progress }, &mut clock)?
         }

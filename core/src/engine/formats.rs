@@ -23,7 +23,7 @@ use crate::io::rows::Said;
 use crate::io::write_behind::Nameless;
 use crate::output::edit::Edit;
 use crate::output::emit::{self, Content};
-use crate::output::encode::{self, Body, Layout};
+use crate::output::encode::{self, Body, Heading, Layout};
 use crate::output::indexed::Indexed;
 use crate::output::model::Account;
 use crate::output::rows::Planned;
@@ -96,17 +96,16 @@ fn layout_of(format: Format, unit: Option<&'static str>) -> Option<Layout> {
 /// [`Error`], any of them.
 pub(crate) fn into_stl(mesh: MeshFile, output: &Path, target: Target, work: Work<'_>, clock: &mut Clock) -> Result<Report> {
     let Work { profile, limits, progress } = work;
-    let loses = !target.is_input && !matches!(Said::by(&mesh), Said::Nothing);
-    let triangles = mesh.records().len() as u64;
+    let lost = if target.is_input { 0 } else { Said::by(&mesh).triangles(mesh.records().len()) };
     // A result that the profile refuses is never at its place.
-    let nameless = if loses && profile.attributes == KeepAttributes::Refuse { Some(Nameless::new(limits)?) } else { None };
+    let nameless = if lost > 0 && profile.attributes == KeepAttributes::Refuse { Some(Nameless::new(limits)?) } else { None };
     let place = nameless.as_ref().map(Nameless::path);
     let output = place.as_deref().unwrap_or(output);
     let doubt = mesh.doubt();
     let mut report = files::make(mesh, output, target.is_input, (profile, limits), progress, clock)?.report;
     carried::ask_if_doubtful(&mut report, doubt);
-    if loses && report.output.is_some() {
-        let account = Account { lost: triangles, ..Account::default() };
+    if lost > 0 && report.output.is_some() {
+        let account = Account { lost, ..Account::default() };
         report.attributes = Some(account.told());
         carried::heed(&mut report, profile, carried::harm(account));
     }
@@ -139,7 +138,8 @@ pub(crate) fn through_a_spool(
     let planned = if target.is_input && !is_copy { carried::plan(&said, &made) } else { None };
     let triangles = made.mesh.records().len();
     let account = carried::account(&said, planned.as_ref(), triangles);
-    let account = account.map(|account| if is_copy { Account { kept: triangles as u64, ..Account::default() } } else { account });
+    let kept = || Account { kept: said.triangles(triangles), ..Account::default() };
+    let account = account.map(|account| if is_copy { kept() } else { account });
     report.attributes = account.map(Account::told);
     if !carried::heed(&mut report, profile, account.and_then(carried::harm)) {
         return Ok(report);
@@ -147,7 +147,8 @@ pub(crate) fn through_a_spool(
     let written = if is_copy {
         copy(input, output, limits, progress)?
     } else {
-        write((&spool, input), output, (planned, layout), work, clock)?
+        let judged = files::open(&spool, limits, progress)?;
+        write(&Whole { made: &judged, ..Whole::of(&made.mesh, input) }, output, (planned, layout), work, clock)?
     };
     let facts = files::facts(&written, files::hash(&written, limits, progress));
     if is_copy && facts.blake3 != report.input.blake3 {
@@ -161,20 +162,38 @@ pub(crate) fn through_a_spool(
     Ok(report)
 }
 
-/// Writes the STL `spool` of `input` to the new file `output`, in the rows of its file where there is a plan of that, and reads it back.
+/// A mesh that is written, and what its file says of it.
+pub(crate) struct Whole<'a> {
+    /// Its triangles.
+    pub(crate) made: &'a MeshFile,
+    /// As [`MeshFile::title`].
+    pub(crate) title: &'a str,
+    /// Meshes of their own, if there are several, as they are in `made`; of one alone, its name counts.
+    pub(crate) parts: &'a [Part],
+    /// Refusals name it.
+    pub(crate) input: &'a Path,
+}
+
+impl<'a> Whole<'a> {
+    /// A file as it stands.
+    fn of(mesh: &'a MeshFile, input: &'a Path) -> Self {
+        Self { made: mesh, title: mesh.title(), parts: mesh.parts(), input }
+    }
+}
+
+/// Writes a mesh to the new file `output`, in the rows of its file where there is a plan of that, and reads it back.
 fn write(
-    (spool, input): (&Path, &Path),
+    whole: &Whole<'_>,
     output: &Path,
     (planned, layout): (Option<Planned<'_>>, Layout),
     work: Work<'_>,
     clock: &mut Clock,
 ) -> Result<MeshFile> {
     let Work { limits, progress, .. } = work;
-    let made = files::open(spool, limits, progress)?;
-    let Some(planned) = &planned else { return encode((&made, &[], input), output, layout, work, clock) };
+    let Some(planned) = &planned else { return encode(whole, output, layout, work, clock) };
     let written = carried::write(planned, output, limits, progress)?;
     clock.stage("encode");
-    carried::confirm(planned, &made, &written)?;
+    carried::confirm(planned, whole.made, &written)?;
     Ok(written)
 }
 
@@ -199,7 +218,7 @@ pub(crate) fn convert(
             refuse_infinite(&mesh)?;
             refuse_unit(input, mesh.unit(), format)?;
             let work = Work { profile: &Profile::default(), limits, progress };
-            encode((&mesh, mesh.parts(), input), output, layout, work, &mut Clock::start())?
+            encode(&Whole::of(&mesh, input), output, layout, work, &mut Clock::start())?
         }
         None if !target.is_input => {
             let edit = Edit::default();
@@ -213,7 +232,8 @@ pub(crate) fn convert(
     };
     mesh.check_unchanged()?;
     let facts = |mesh: &MeshFile| files::facts(mesh, files::hash(mesh, limits, progress));
-    Ok(Converted { input: facts(&mesh), output: facts(&written) })
+    let attributes_lost = if target.is_input { 0 } else { Said::by(&mesh).triangles(mesh.records().len()) };
+    Ok(Converted { input: facts(&mesh), output: facts(&written), attributes_lost })
 }
 
 /// AMF has no centimetre (ISO/ASTM 52915:2020, section 5.2): its readers would take other lengths.
@@ -282,21 +302,22 @@ pub(crate) fn copy(input: &Path, output: &Path, limits: &Limits, progress: &dyn 
     files::open(output, limits, progress)
 }
 
-/// Writes the triangles of `made` to the new file `output`, in meshes of their own where there are `parts` and the format holds several; reads the file
-/// back, and compares.
+/// Writes a mesh to the new file `output`, in meshes of their own where there are several and the format holds them; reads the file back, and compares.
 ///
 /// # Errors
-/// [`Error`], any of them; [`Error::Refused`] for a triangle that the format cannot hold: `input` is the file that has it.
+/// [`Error`], any of them; [`Error::Refused`] for a triangle that the format cannot hold.
 pub(crate) fn encode(
-    (made, parts, input): (&MeshFile, &[Part], &Path),
+    whole: &Whole<'_>,
     output: &Path,
     layout: Layout,
     Work { limits, progress, .. }: Work<'_>,
     clock: &mut Clock,
 ) -> Result<MeshFile> {
+    let Whole { made, title, parts, input } = *whole;
     refuse_repeated(made, input, layout, limits)?;
-    let whole = [Part { name: String::new(), triangles: 0..made.records().len() }];
-    let parts = if layout.holds_several() && parts.len() > 1 { parts } else { &whole };
+    let name = parts.first().filter(|_| parts.len() == 1).map(|part| part.name.clone()).unwrap_or_default();
+    let all = [Part { name, triangles: 0..made.records().len() }];
+    let parts = if layout.holds_several() && parts.len() > 1 { parts } else { &all };
     let body = |part: &'_ Part| {
         let records = made.records().get(part.triangles.clone()).unwrap_or_default();
         Ok((Indexed::of(output, records, limits, progress)?, records.len()))
@@ -304,15 +325,16 @@ pub(crate) fn encode(
     let bodies: Result<Vec<_>> = parts.iter().map(body).collect();
     let bodies: Vec<_> =
         bodies?.into_iter().zip(parts).map(|((mesh, records), part)| Body { name: &part.name, mesh, records }).collect();
-    encode::write(&bodies, (layout, concat!("Suture ", env!("CARGO_PKG_VERSION"))), output, limits, progress)?;
+    let heading = Heading { maker: concat!("Suture ", env!("CARGO_PKG_VERSION")), title };
+    encode::write(&bodies, (layout, heading), output, limits, progress)?;
     drop(bodies);
     made.let_go();
     let written = files::open(output, limits, progress)?;
     clock.stage("encode");
     confirm(made, &written, limits)?;
-    let ranges = |parts: &[Part]| parts.iter().map(|part| part.triangles.clone()).collect::<Vec<_>>();
-    let expected = if parts.len() > 1 { ranges(parts) } else { Vec::new() };
-    if matches!(layout, Layout::Amf(_)) && ranges(written.parts()) != expected {
+    let is_named = |parts: &[Part]| parts.len() > 1 || parts.iter().any(|part| !part.name.is_empty());
+    let expected = if is_named(parts) { parts } else { &[] };
+    if matches!(layout, Layout::Amf(_)) && written.parts() != expected {
         return Err(differs(&written));
     }
     Ok(written)

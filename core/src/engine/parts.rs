@@ -12,7 +12,7 @@ use crate::contract::report::{Outcome, Report, Task};
 use crate::contract::settings::Limits;
 use crate::engine::carried;
 use crate::engine::clock::Clock;
-use crate::engine::formats::{self, Target};
+use crate::engine::formats::{self, Target, Whole};
 use crate::engine::together::{Section, certify, together};
 use crate::engine::work::Work;
 use crate::engine::{files, judging, nameless_stl};
@@ -74,7 +74,10 @@ pub(crate) fn repair(
     let (made, parts, _held) = results.finish(mesh, work)?;
     let written = match target.layout {
         _ if is_copy => formats::copy(input, output, limits, progress)?,
-        Some(layout) => formats::encode((&made, &parts, input), output, layout, work, clock)?,
+        Some(layout) => {
+            let whole = Whole { made: &made, title: mesh.title(), parts: &parts, input };
+            formats::encode(&whole, output, layout, work, clock)?
+        }
         None => formats::copy(made.path(), output, limits, progress)?,
     };
     mesh.check_unchanged()?;
@@ -86,8 +89,8 @@ pub(crate) fn repair(
 
 /// Is there a result? Tells of attributes.
 fn is_written(mesh: &MeshFile, is_copy: bool, differ: bool, report: &mut Report, work: Work<'_>) -> bool {
-    let triangles = mesh.records().len() as u64;
-    if !matches!(Said::by(mesh), Said::Nothing) {
+    let triangles = Said::by(mesh).triangles(mesh.records().len());
+    if triangles > 0 {
         let (kept, lost) = if is_copy { (triangles, 0) } else { (0, triangles) };
         let account = Account { kept, lost, ..Account::default() };
         report.attributes = Some(account.told());

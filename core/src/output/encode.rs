@@ -56,6 +56,14 @@ pub(crate) struct Body<'r> {
     pub(crate) records: usize,
 }
 
+/// What a file says of itself, where its format has a place for it.
+#[derive(Clone, Copy)]
+pub(crate) struct Heading<'a> {
+    pub(crate) maker: &'a str,
+    /// The name of the whole, or nothing.
+    pub(crate) title: &'a str,
+}
+
 /// Text before and behind all meshes, and between and behind the vertices and faces of each.
 struct Frame {
     head: String,
@@ -70,8 +78,8 @@ impl Layout {
         matches!(self, Self::Amf(_) | Self::ThreeMf(_))
     }
 
-    /// Around these meshes in a file of this name.
-    fn frame(self, bodies: &[Body<'_>], name: &str) -> Frame {
+    /// Around these meshes.
+    fn frame(self, bodies: &[Body<'_>], Heading { maker, title }: Heading<'_>) -> Frame {
         let vertices: u64 = bodies.iter().map(|body| u64::from(body.mesh.vertices())).sum();
         let faces: usize = bodies.iter().map(|body| body.records).sum();
         let plain = |head: String| Frame { head, between: "", behind: "", tail: String::new() };
@@ -80,15 +88,15 @@ impl Layout {
                 // Most readers take indices as signed.
                 let index = if i32::try_from(vertices).is_ok() { "int" } else { "uint" };
                 plain(format!(
-                    "ply\nformat binary_little_endian 1.0\ncomment {name}\nelement vertex {vertices}\nproperty float x\nproperty float y\n\
+                    "ply\nformat binary_little_endian 1.0\ncomment {maker}\nelement vertex {vertices}\nproperty float x\nproperty float y\n\
                      property float z\nelement face {faces}\nproperty list uchar {index} vertex_indices\nend_header\n"
                 ))
             }
             // Readers refuse a comment before the counts, MeshLib's among them.
             Self::Off => plain(format!("OFF\n{vertices} {faces} 0\n")),
-            Self::Obj => plain(format!("# {name}\n# {vertices} vertices, {faces} faces\n")),
+            Self::Obj => plain(format!("# {maker}\n# {vertices} vertices, {faces} faces\n")),
             Self::Amf(unit) => {
-                let name = escaped(name);
+                let name = escaped(if title.is_empty() { maker } else { title });
                 let head = format!(
                     "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<amf unit=\"{unit}\" version=\"1.2\">\n<metadata type=\"name\">{name}</metadata>\n"
                 );
@@ -96,7 +104,7 @@ impl Layout {
                 Frame { head, between: "</vertices>\n<volume>\n", behind, tail: "</amf>\n".into() }
             }
             Self::ThreeMf(unit) => Frame {
-                head: package::head(unit, &escaped(name)),
+                head: package::head(unit, &escaped(maker), &escaped(title)),
                 between: package::BETWEEN,
                 behind: package::OBJECT_END,
                 tail: package::tail(bodies.len()),
@@ -193,19 +201,19 @@ fn integer(mut value: u64, out: &mut Vec<u8>) {
     out.extend_from_slice(&digits[at..]);
 }
 
-/// Writes these meshes to the new file `output`, and syncs it unless that is deferred. `name` stands in it as a comment. Formats that hold one mesh
+/// Writes these meshes to the new file `output`, and syncs it unless that is deferred. Formats that hold one mesh
 /// are given one.
 ///
 /// # Errors
 /// [`Error::Io`], cancellation among them.
 pub(crate) fn write(
     bodies: &[Body<'_>],
-    (layout, name): (Layout, &str),
+    (layout, heading): (Layout, Heading<'_>),
     output: &Path,
     limits: &Limits,
     progress: &dyn Progress,
 ) -> Result<()> {
-    let Frame { head, between, behind, tail } = layout.frame(bodies, name);
+    let Frame { head, between, behind, tail } = layout.frame(bodies, heading);
     let mut steps = Steps { done: 0, all: 2 * bodies.iter().map(|body| body.records as u64).sum::<u64>(), output, progress };
     let fill = |sink: &mut Sink<'_>| {
         sink(head.as_bytes())?;
@@ -219,7 +227,7 @@ pub(crate) fn write(
     parallel::in_pool(limits.threads, || match layout {
         Layout::ThreeMf(_) => {
             let most: u64 = bodies.iter().map(Body::most_text).sum();
-            package::write(output, MOST_AROUND + most, fill, limits, progress)
+            package::write(output, (head.len() + tail.len()) as u64 + most, fill, limits, progress)
         }
         _ => to_file(output, fill, limits),
     })
@@ -318,7 +326,7 @@ mod tests {
         let limits = Limits { threads: 2, spool: Some(folder.path().into()), ..Limits::default() };
         let mesh = Indexed::of(Path::new("a"), records, &limits, &Quiet).unwrap();
         let bodies = [Body { name: "", mesh, records: records.len() }];
-        write(&bodies, (layout, "a & b"), &output, &limits, &Quiet).unwrap();
+        write(&bodies, (layout, Heading { maker: "a & b", title: "" }), &output, &limits, &Quiet).unwrap();
         std::fs::read(output).unwrap()
     }
 

@@ -30,10 +30,11 @@ pub(super) const BETWEEN: &str = "</vertices>\n<triangles>\n";
 pub(super) const OBJECT_END: &str = "</triangles>\n</mesh>\n</object>\n";
 
 /// Before the first object. `application`: the program that wrote it.
-pub(super) fn head(unit: &str, application: &str) -> String {
+pub(super) fn head(unit: &str, application: &str, title: &str) -> String {
+    let title = if title.is_empty() { String::new() } else { format!("<metadata name=\"Title\">{title}</metadata>\n") };
     format!(
         "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<model unit=\"{unit}\" xml:lang=\"en-US\" xmlns=\"{NAMESPACE}\">\n\
-         <metadata name=\"Application\">{application}</metadata>\n<resources>\n"
+         {title}<metadata name=\"Application\">{application}</metadata>\n<resources>\n"
     )
 }
 

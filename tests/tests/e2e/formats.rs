@@ -126,6 +126,30 @@ fn the_format_of_a_result_can_be_chosen() {
     assert_eq!(written, solid_box());
     let ran = place.suture(["repair", "part.obj", "-o", "x.obj", "--format", "step"]).expect(2);
     assert!(ran.stderr().contains("stl, 3mf, ply, off, obj, amf"), "{}", ran.stderr());
+    // Which of the two would be meant?
+    let ran = place.suture(["repair", "part.obj", "-o", "x.stl", "--format", "obj"]).expect(2);
+    assert!(ran.stderr().contains("x.stl") && ran.stderr().contains("change one of them"), "{}", ran.stderr());
+    assert!(!place.at("x.stl").exists());
+}
+
+/// The words of colours in an STL, and the colours of a PLY, find no place in other formats: that is told.
+#[test]
+fn a_conversion_tells_what_it_loses() {
+    let place = Place::new();
+    let mut coloured = stl::mesh(&solid_box());
+    (0..5).for_each(|k| coloured[84 + 50 * k + 48] = 7);
+    place.put("coloured.stl", &coloured);
+    place.put("plain.stl", &stl::mesh(&solid_box()));
+    let said = |from: &str, to: &str| place.suture(["convert", from, to]).expect(0).stdout();
+    let lost = "  lost: colours, paint or other attributes of";
+    assert!(said("coloured.stl", "a.obj").contains(&format!("{lost} 5 triangles\n")));
+    for (from, to) in [("coloured.stl", "b.stl"), ("plain.stl", "c.obj")] {
+        assert!(!said(from, to).contains("lost"), "{from}");
+    }
+    let report = place.repair("coloured.stl", "d.ply", &[]).expect(0).report();
+    assert_eq!(report["attributes"]["lost"], 5, "{}", report["attributes"]);
+    let report = place.repair("coloured.stl", "e.stl", &[]).expect(0).report();
+    assert!(report["attributes"].is_null(), "{}", report["attributes"]);
 }
 
 #[test]

@@ -320,6 +320,45 @@ fn untouched_rows_stay_byte_for_byte() {
     assert!(output.contains(&format!("element face {}\n", 5 + output.matches("\n4 0 1 5 4\n").count() + triangles)), "{output}");
 }
 
+/// Of 128 vertices, the last one that a signed byte tells apart: where the result has more, it is the same as that of a file with wider indices.
+#[test]
+fn indices_become_wider_where_vertices_are_new() {
+    let apart = (0..14).flat_map(|k| shifted(&cube(), [0.0, 4.0 + 2.0 * k as f32, 0.0]));
+    let mesh = Mesh::of(&[crossing(), apart.collect()].concat());
+    assert_eq!(mesh.points.len(), 128);
+    let file = |form: Form, kind: &str| {
+        let wide = ply(&mesh, form, ["s", "t"], |k| k as u8);
+        if form == Form::Text {
+            return String::from_utf8(wide).unwrap().replace("uchar int vertex", &format!("uchar {kind} vertex")).into_bytes();
+        }
+        let end = wide.windows(11).position(|window| window == b"end_header\n").unwrap() + 11;
+        let head = std::str::from_utf8(&wide[..end]).unwrap().replace("uchar int vertex", &format!("uchar {kind} vertex"));
+        let faces = end + mesh.points.len() * 20;
+        let low = if form == Form::Big { 3 } else { 0 };
+        // Red, the count, three indices of four bytes, the normal.
+        let narrow = |row: &[u8]| [&row[..2], &[2, 6, 10].map(|at| row[at + low]), &row[14..]].concat();
+        [head.as_bytes(), &wide[end..faces], &wide[faces..].chunks(18).flat_map(narrow).collect::<Vec<u8>>()].concat()
+    };
+    for form in [Form::Text, Form::Little, Form::Big] {
+        let wide = repaired("ply", &ply(&mesh, form, ["s", "t"], |k| k as u8), &Profile::default());
+        for kind in ["char", "int8"] {
+            let narrow = repaired("ply", &file(form, kind), &Profile::default());
+            assert!(
+                narrow.report.attributes.is_some_and(|own| own.lost == 0 && own.kept > 150),
+                "{:?}",
+                narrow.report.attributes
+            );
+            assert_eq!(narrow.output, wide.output);
+        }
+    }
+    // Where they suffice, they stay.
+    let mut few = Mesh::of(&cube());
+    few.faces.pop();
+    let text = String::from_utf8(ply(&few, Form::Text, ["s", "t"], |_| 1)).unwrap().replace("uchar int v", "uchar char v");
+    let output = repaired("ply", text.as_bytes(), &Profile::default()).output;
+    assert!(String::from_utf8(output).unwrap().contains("uchar char vertex_indices"));
+}
+
 #[test]
 fn an_off_keeps_its_colours() {
     let mut mesh = Mesh::of(&crossing());

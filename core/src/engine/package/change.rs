@@ -76,7 +76,7 @@ struct Mended {
 
 impl<'a> Maker<'a> {
     pub(super) fn new(package: &'a PackageFile, work: Work<'a>) -> Self {
-        let volumes = package.volumes().iter().map(|volume| volume.triangles.clone()).collect();
+        let volumes = package.volumes().all().iter().map(|volume| volume.triangles.clone()).collect();
         let (texts, expected) = (BTreeMap::new(), Vec::new());
         Self { package, work, texts, account: Account::default(), expected, volumes, objects_without_sets: 0 }
     }
@@ -155,12 +155,22 @@ impl<'a> Maker<'a> {
         new.at = written.at;
         self.objects_without_sets += u64::from(written.is_without_sets);
         self.account.add(written.account);
-        let mut at = 0;
-        for (volume, triangles) in self.package.volumes_at(place).into_iter().zip(&written.triangles) {
-            if let Some(range) = self.volumes.get_mut(volume) {
+        let (own, mut at) = (self.package.volumes_at(place), 0);
+        for (volume, triangles) in own.iter().zip(&written.triangles) {
+            if let Some(range) = self.volumes.get_mut(*volume) {
                 *range = at..at + triangles;
             }
             at += triangles;
+        }
+        if self.package.volumes().stand_in_meshes() {
+            let volumes = || own.iter().filter_map(|k| Some((self.package.volumes().all().get(*k)?, self.volumes.get(*k)?)));
+            let places = || volumes().flat_map(|(volume, _)| &volume.places);
+            if places().any(|place| place.start < new.at) {
+                return Err(self.package.refused(place, "has sets of triangles behind the volumes of its slicer"));
+            }
+            let to = places().map(|place| place.end).max().unwrap_or(new.at);
+            sink(&slicer::renumbered(text.text, new.at..to, volumes()))?;
+            new.at = to;
         }
         Ok(())
     }
@@ -184,9 +194,11 @@ impl<'a> Maker<'a> {
                 .ok_or_else(|| Error::io(self.package.path(), "writing")(std::io::ErrorKind::NotFound.into()))?;
             content.insert(entry, map);
         }
-        let is_renumbered = self.package.volumes().iter().map(|volume| &volume.triangles).ne(&self.volumes);
-        let renumbered = |of: &Config| (of.entry, slicer::renumbered(&of.text, &of.volumes, &self.volumes));
-        let configs = self.package.configs().iter().filter(|_| is_renumbered).map(renumbered).collect();
+        let volumes = self.package.volumes();
+        let is_renumbered = volumes.all().iter().map(|volume| &volume.triangles).ne(&self.volumes);
+        let renumbered =
+            |of: &Config| (of.entry, slicer::renumbered(&of.text, 0..of.text.len(), of.volumes.iter().zip(&self.volumes)));
+        let configs = volumes.configs.iter().filter(|_| is_renumbered && !volumes.stand_in_meshes()).map(renumbered).collect();
         let objects_without_sets = self.objects_without_sets;
         Ok(Changed { content, configs, account: self.account, objects_without_sets, expected: self.expected })
     }

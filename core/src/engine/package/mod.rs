@@ -194,7 +194,7 @@ fn facts(package: &PackageFile, blake3: String, triangles: u64) -> FileFacts {
 }
 
 fn nothing(package: &PackageFile) -> Error {
-    Error::Unreadable { path: package.path().into(), reason: "a package without a mesh of triangles".into() }
+    Error::Unreadable { path: package.path().into(), reason: "a package without a mesh of triangles that is printed".into() }
 }
 
 impl Account {

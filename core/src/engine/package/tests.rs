@@ -173,7 +173,7 @@ fn volumes_of_a_project_are_meshes_of_their_own() {
     assert_eq!(repaired.report.outcome, Outcome::Repaired, "{:?}", repaired.report.verdict);
     let limits = Limits { spool: Some(repaired.folder.path().into()), ..Limits::default() };
     let package = PackageFile::open(&repaired.folder.path().join("out.3mf"), &limits, &Quiet).unwrap().unwrap();
-    let ranges: Vec<_> = package.volumes().iter().map(|volume| volume.triangles.clone()).collect();
+    let ranges: Vec<_> = package.volumes().all().iter().map(|volume| volume.triangles.clone()).collect();
     assert_eq!(ranges, [0..12, 12..24]);
 }
 
@@ -258,7 +258,7 @@ fn new_vertices_of_a_volume_stand_before_those_of_the_next() {
     let place = package.meshes()[0];
     let (text, _, within) = package.mesh_at(place);
     let corners: Vec<_> = Elements::within(text, within).map(|element| (element.vertices, element.attributes.len())).collect();
-    let first = package.volumes()[0].triangles.end as usize;
+    let first = package.volumes().all()[0].triangles.end as usize;
     let own = corners[..first].iter().flat_map(|(vertices, _)| vertices).max().unwrap();
     let next = corners[first..].iter().flat_map(|(vertices, _)| vertices).min().unwrap();
     assert!(*own > 15 && own < next, "{own} {next}");
@@ -309,11 +309,39 @@ fn volumes_are_renumbered_wherever_they_stand() {
         assert_eq!(repaired.report.outcome, Outcome::Repaired, "{:?}", repaired.report.verdict);
         let limits = Limits { spool: Some(repaired.folder.path().into()), ..Limits::default() };
         let package = PackageFile::open(&repaired.folder.path().join("out.3mf"), &limits, &Quiet).unwrap().unwrap();
-        assert_eq!(package.configs().len(), names.len());
-        for config in package.configs() {
+        assert_eq!(package.volumes().configs.len(), names.len());
+        for config in &package.volumes().configs {
             let ranges: Vec<_> = config.volumes.iter().map(|volume| volume.triangles.clone()).collect();
             assert_eq!(ranges, [0..12, 12..24]);
         }
+    }
+}
+
+/// Slic3r 1.3 writes its volumes into the mesh.
+#[test]
+fn volumes_in_a_mesh_are_meshes_of_their_own() {
+    let second: String = (0..8).map(corner).map(|[x, y, z]| format!("<vertex x=\"{}\" y=\"{y}\" z=\"{z}\"/>", x + 5)).collect();
+    let mut both = BOX[..11].to_vec();
+    both.extend(BOX.map(|triangle| triangle.map(|k| k + 8)));
+    let volumes = |last: usize, modifier: u8| {
+        format!(
+            "<slic3r:volumes><slic3r:volume ts=\"0\" te=\"{last}\" modifier=\"0\" ><slic3r:metadata type=\"a\" config=\"1\"/></slic3r:volume>\
+            <slic3r:volume ts=\"{}\" te=\"{}\" modifier=\"{modifier}\" /></slic3r:volumes></mesh>",
+            last + 1,
+            last + 12
+        )
+    };
+    for modifier in [0, 1] {
+        let text = object(1, &[vertices(), second.clone()].concat(), &triangles(&both, |_| String::new()));
+        let input = package(&[text.replace("</mesh>", &volumes(10, modifier))], &[]);
+        let repaired = Repaired::of(&input, &Profile::default());
+        assert_eq!(repaired.report.outcome, Outcome::Repaired, "{:?}", repaired.report.verdict);
+        assert!(repaired.text().contains(&volumes(11, modifier)), "{}", repaired.text());
+        assert_eq!(repaired.report.objects.len(), 2 - usize::from(modifier));
+        let other = Repaired::of(&input, &Profile { format: OutputFormat::Stl, ..Profile::default() });
+        // The two boxes cross.
+        let expected = if modifier == 0 { (Outcome::NotGood, Some(24)) } else { (Outcome::Repaired, Some(12)) };
+        assert_eq!((other.report.outcome, other.report.output.map(|output| output.triangles)), expected);
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use crate::contract::error::{Error, Result};
+use crate::contract::error::Result;
 use crate::engine::nameless_stl;
 use crate::engine::work::Work;
 use crate::io::read::{MeshFile, MeshRecords, PackageFile, Place};
@@ -24,10 +24,7 @@ pub(super) struct UnitOf {
 /// [`Error::Unreadable`] if the object's volumes are not its triangles, one volume after the other, or a triangle has no vertices.
 pub(super) fn of(package: &PackageFile, place: Place, read: &MeshRecords) -> Result<Vec<UnitOf>> {
     let count = read.parsed.records.all().len();
-    let refuse = |reason: &str| {
-        let (id, _, part) = package.names(place);
-        Error::Unreadable { path: package.path().into(), reason: format!("object {id} of the part {part} {reason}") }
-    };
+    let refuse = |reason: &str| package.refused(place, reason);
     if read.triangles != count as u64 {
         return Err(refuse("has triangles whose vertices are not there"));
     }

@@ -90,6 +90,42 @@ fn volumes_of_an_object_stay_apart() {
     assert_eq!(parts(&read(&output, folder.path())), [("lid volume 1", 12), ("lid volume 2", 12)]);
 }
 
+/// Names of the file, of a lone object and of volumes are those of the result; other metadata are told.
+#[test]
+fn names_stay() {
+    let folder = tempfile::tempdir().unwrap();
+    let named = |text: String, name: &str| {
+        let metadata =
+            format!("<volume><metadata type=\"slic3r.extruder\">1</metadata><metadata type=\"name\">{name}</metadata>");
+        text.replacen("<volume><tri", &format!("{metadata}<tri"), 1)
+    };
+    let title = "<metadata type=\"name\">Vase &lt;1&gt;</metadata>";
+    let beside = shifted(&cube(), [1.0, 0.0, 0.0]);
+    let two = named(named(object(7, "lid", &[&cube(), &beside[1..]]), "ring"), "knob");
+    let lone = object(1, "cup", &[&cube()[1..]]);
+    let of_volume = named(object(1, "", &[&cube()[1..]]), "disc");
+    for (text, names) in [(two, vec!["lid ring", "lid knob"]), (lone, vec!["cup"]), (of_volume, vec!["disc"])] {
+        let input = write(folder.path(), &format!("{title}{text}"));
+        let (report, output) = repaired(folder.path(), &input, &Profile::default()).unwrap();
+        assert_eq!(report.outcome, Outcome::Repaired, "{:?}", report.verdict.reasons);
+        let written = read(&output, folder.path());
+        assert_eq!(parts(&written).into_iter().map(|(name, _)| name).collect::<Vec<_>>(), names);
+        assert_eq!((written.title(), written.is_flawless()), ("Vase <1>", true));
+        let metadata = text.matches("slic3r.extruder").count();
+        let told = report.input.findings.iter().any(|finding| finding.contains("of metadata besides names"));
+        assert_eq!(told, metadata > 0, "{:?}", report.input.findings);
+        // A package has them, too.
+        std::fs::remove_file(&output).unwrap();
+        let (_, output) =
+            repaired(folder.path(), &input, &Profile { format: OutputFormat::ThreeMf, ..Profile::default() }).unwrap();
+        let objects = entry::inspect(&output, &Profile::default(), &limits(folder.path()), &Quiet).unwrap().objects;
+        let shown: Vec<_> =
+            if objects.is_empty() { names.clone() } else { objects.iter().map(|own| own.name.as_str()).collect() };
+        assert_eq!(shown, names);
+        std::fs::remove_file(&output).unwrap();
+    }
+}
+
 #[test]
 fn sound_objects_are_copied_and_damaged_ones_alone_say_why() {
     let folder = tempfile::tempdir().unwrap();

@@ -10,7 +10,7 @@ use std::ops::Range;
 use super::binary;
 use super::finding::{Finding, Loss, Rejection};
 use super::limits::most_copies;
-use super::parsed::Parsed;
+use super::parsed::{Besides, Parsed};
 use super::rounding::Rounding;
 use super::spool::{Context, Items, Spool};
 use super::threemf::slicer::Volume;
@@ -39,7 +39,7 @@ pub(super) fn mesh(
         *times.entry(place).or_default() += 1;
         Ok(())
     })?;
-    let mut reading = Reading { model, context, findings: Vec::new(), unsaid: Vec::new() };
+    let mut reading = Reading { model, context, findings: Vec::new(), unsaid: Vec::new(), coloured: 0 };
 
     let (mut kept, mut where_kept, mut copies) = (context.records()?, HashMap::new(), 0u64);
     let mut again: Vec<(Place, u64)> = times.into_iter().filter(|(_, times)| *times > 1).collect();
@@ -73,23 +73,20 @@ pub(super) fn mesh(
     if spool.count() == 0 {
         return Err(binary::no_triangles().at(context.path));
     }
+    let coloured = reading.coloured;
     Ok(Parsed {
         records: spool.map()?,
         findings: [model.findings.clone(), reading.findings(), left_out(volumes)].concat(),
         header: binary::header_of(b""),
         rounding: rounding.if_any(),
-        unit: Some(model.unit().name()),
-        positions: None,
-        coloured: false,
-        parts: Vec::new(),
-        doubt: None,
+        besides: Besides { unit: Some(model.unit().name()), coloured, ..Besides::default() },
     })
 }
 
 /// The triangles of an object that are parts of the model, where a slicer's volumes are all of its triangles, one behind the other; else all.
 fn parts(model: &Model, volumes: &[Volume], place: Place, triangles: usize) -> Vec<Range<usize>> {
-    let id = model.object(place).map(|object| object.id).filter(|_| place.part == 0);
-    let own = || volumes.iter().filter(|volume| Some(volume.object) == id);
+    let id = model.object(place).map(|object| object.id);
+    let own = || volumes.iter().filter(|volume| id.is_some_and(|id| volume.is_of(place.part, id)));
     let mut end = 0;
     let follows = |volume: &Volume| std::mem::replace(&mut end, volume.triangles.end) == volume.triangles.start;
     let fits = own().all(follows) && end == triangles as u64;
@@ -131,11 +128,14 @@ struct Reading<'a> {
     findings: Vec<Finding>,
     /// Beyond those: at most one for each way in which they weigh.
     unsaid: Vec<(Finding, u64)>,
+    /// Triangles with paint, colours or materials, once for each object.
+    coloured: u64,
 }
 
 impl Reading<'_> {
     fn read(&mut self, place: Place) -> Result<MeshRecords> {
         let mut read = self.model.records(place, self.context)?;
+        self.coloured += read.with_any;
         std::mem::take(&mut read.parsed.findings).into_iter().for_each(|finding| self.note(finding));
         Ok(read)
     }

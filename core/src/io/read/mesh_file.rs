@@ -4,18 +4,19 @@ use super::access::Bytes;
 use super::finding::Finding;
 use super::limits::HEADER_BYTES;
 use super::opened::Opened;
-use super::parsed::{Parsed, Part};
+use super::parsed::{Besides, Parsed, Part};
 use super::rounding::Rounding;
 use super::spool::{Context, Items};
-use super::vertices::{Positions, Vertices};
+use super::vertices::Vertices;
 use super::{amf, binary, obj, off, ply, sniff, tail, text, unpacked};
 use crate::contract::error::Result;
 use crate::contract::progress::Progress;
 use crate::contract::report::Format;
 use crate::contract::settings::Limits;
-use crate::io::record::Record;
+use crate::io::record::{self, Record};
 use crate::util::parallel;
 use memmap2::Mmap;
+use rayon::prelude::*;
 use std::fs::File;
 use std::path::{Path, PathBuf};
 
@@ -37,28 +38,17 @@ pub struct MeshFile {
     /// As errors and reports name it.
     name: PathBuf,
     input: Bytes,
-    source: Source,
-    format: Format,
-    findings: Vec<Finding>,
-    header: [u8; HEADER_BYTES],
-    unit: Option<&'static str>,
-    positions: Option<Positions>,
-    coloured: bool,
-    parts: Vec<Part>,
-    doubt: Option<&'static str>,
+    content: Content,
 }
 
 /// What the bytes of a file hold.
+#[derive(Debug)]
 pub(super) struct Content {
     source: Source,
     format: Format,
     pub(super) findings: Vec<Finding>,
     header: [u8; HEADER_BYTES],
-    unit: Option<&'static str>,
-    positions: Option<Positions>,
-    coloured: bool,
-    parts: Vec<Part>,
-    doubt: Option<&'static str>,
+    besides: Besides,
 }
 
 impl Content {
@@ -78,11 +68,7 @@ impl Content {
                     format: Format::BinaryStl,
                     findings,
                     header,
-                    unit: None,
-                    positions: None,
-                    coloured: false,
-                    parts: Vec::new(),
-                    doubt: None,
+                    besides: Besides::default(),
                 })
             }
             sniff::Kind::Text(sniff::Text { start, mut findings }) => {
@@ -132,19 +118,9 @@ impl Content {
 
     /// `findings`: those of the bytes themselves.
     fn parsed(parsed: Parsed, format: Format, findings: Vec<Finding>) -> Self {
-        let Parsed { records, findings: mut found, header, rounding, unit, positions, coloured, parts, doubt } = parsed;
+        let Parsed { records, findings: mut found, header, rounding, besides } = parsed;
         found.extend(rounding.map(Rounding::finding));
-        Self {
-            source: Source::Spooled(records),
-            format,
-            findings: [findings, found].concat(),
-            header,
-            unit,
-            positions,
-            coloured,
-            parts,
-            doubt,
-        }
+        Self { source: Source::Spooled(records), format, findings: [findings, found].concat(), header, besides }
     }
 }
 
@@ -161,26 +137,12 @@ impl MeshFile {
         let (opened, input) = Opened::bytes(path, spool, limits, progress)?;
         let kind = sniff::sniff(&input).map_err(|rejection| rejection.at(path))?;
         let content = Content::of(kind, &input, &Context { path, spool, limits, progress, passed: None })?;
-        let Content { source, format, findings, header, unit, positions, coloured, parts, doubt } = content;
-        Ok(Self {
-            opened,
-            name: path.to_owned(),
-            input,
-            source,
-            format,
-            findings,
-            header,
-            unit,
-            positions,
-            coloured,
-            parts,
-            doubt,
-        })
+        Ok(Self { opened, name: path.to_owned(), input, content })
     }
 
     /// The triangles in input order, those with NaN or infinite coordinates included.
     pub fn records(&self) -> &[Record] {
-        self.records_of(&self.source)
+        self.records_of(&self.content.source)
     }
 
     fn records_of<'s>(&'s self, source: &'s Source) -> &'s [Record] {
@@ -193,12 +155,13 @@ impl MeshFile {
 
     /// The same file with other corners of its triangles.
     pub(crate) fn welded(self, records: Mmap) -> Self {
-        Self { source: Source::Welded(Box::new(self.source), records), ..self }
+        let source = Source::Welded(Box::new(self.content.source), records);
+        Self { content: Content { source, ..self.content }, ..self }
     }
 
     /// The triangles as they were before a weld.
     pub(crate) fn as_it_came(&self) -> &[Record] {
-        match &self.source {
+        match &self.content.source {
             Source::Welded(source, _) => self.records_of(source),
             source => self.records_of(source),
         }
@@ -206,32 +169,32 @@ impl MeshFile {
 
     /// The records stand in the input as they will in an output, after the prefix.
     pub(crate) fn is_in_place(&self) -> bool {
-        matches!(self.source, Source::InPlace(_))
+        matches!(self.content.source, Source::InPlace(_))
     }
 
     /// The format that the file was read as.
     pub fn format(&self) -> Format {
-        self.format
+        self.content.format
     }
 
     /// The name of the unit of all coordinates, where the file says one. Nothing is scaled.
     pub fn unit(&self) -> Option<&'static str> {
-        self.unit
+        self.content.besides.unit
     }
 
     /// Oddities of the file; none of a flawless one.
     pub fn findings(&self) -> &[Finding] {
-        &self.findings
+        &self.content.findings
     }
 
     /// No finding that common readers stumble over: if its mesh is good, too, the file may be passed on as it is.
     pub fn is_flawless(&self) -> bool {
-        self.findings.iter().all(|finding| finding.harmless)
+        self.content.findings.iter().all(|finding| finding.harmless)
     }
 
     /// The 80 bytes an output begins with: the input's own, changed only where they begin with `solid`.
     pub fn output_header(&self) -> [u8; HEADER_BYTES] {
-        self.header
+        self.content.header
     }
 
     /// The whole input as it stands on disk, for hashing and copying.
@@ -253,29 +216,37 @@ impl MeshFile {
         if let Some(map) = self.input.map() {
             map.let_go();
         }
-        if let Source::Spooled(records) = &self.source {
+        if let Source::Spooled(records) = &self.content.source {
             records.let_go();
         }
     }
 
     /// The positions that its faces name by number, where it has one table of them.
     pub(crate) fn vertices(&self) -> Option<Vertices<'_>> {
-        Some(self.positions.as_ref()?.vertices(&self.input))
+        Some(self.content.besides.positions.as_ref()?.vertices(&self.input))
     }
 
-    /// Meshes that are never welded to each other, one behind the other, all triangles in them; none where all of it is one mesh.
+    /// Meshes that are never welded to each other, one behind the other, all triangles in them. Of a file of one mesh that one, if it has a name; else none.
     pub(crate) fn parts(&self) -> &[Part] {
-        &self.parts
+        &self.content.besides.parts
     }
 
     /// A person should look at a result that is no copy, for this reason.
     pub(crate) fn doubt(&self) -> Option<&'static str> {
-        self.doubt
+        self.content.besides.doubt
     }
 
-    /// It has colours or materials in a form that no result keeps.
-    pub(crate) fn is_coloured(&self) -> bool {
-        self.coloured
+    /// The name of the whole, or nothing.
+    pub(crate) fn title(&self) -> &str {
+        &self.content.besides.title
+    }
+
+    /// Triangles with colours or materials in a form that no result in another format keeps. O(n) for STL.
+    pub(crate) fn coloured(&self) -> u64 {
+        match self.content.format {
+            Format::BinaryStl => self.records().par_iter().filter(|record| record::attribute(record) != 0).count() as u64,
+            _ => self.content.besides.coloured,
+        }
     }
 
     /// The open file that holds the input, and the place in it where `part` of [`MeshFile::bytes`] or of the records lies, if it does: for copies that

@@ -12,7 +12,7 @@ use super::elements::packed;
 use super::elements::text::{Behind, Read, Section};
 use super::elements::{points, polygons};
 use super::finding::{Finding, Rejection};
-use super::parsed::Parsed;
+use super::parsed::{Besides, Parsed};
 use super::spool::Context;
 use super::vertices::{Positions, Vertices};
 use super::{binary, tail};
@@ -56,11 +56,7 @@ pub(super) fn read(bytes: &[u8], context: &Context<'_>) -> Result<Parsed> {
         findings,
         header: binary::header_of(b""),
         rounding: gathered.1,
-        unit: None,
-        positions,
-        coloured: false,
-        parts: Vec::new(),
-        doubt: None,
+        besides: Besides { positions, ..Besides::default() },
     })
 }
 

@@ -8,9 +8,9 @@ use super::archive::Archive;
 use super::finding::{Finding, Rejection};
 use super::opened::Opened;
 use super::spool::Context;
-use super::threemf::slicer::{self, Config, Volume};
+use super::threemf::slicer::{Volume, Volumes};
 use super::threemf::{Content, MeshRecords, Model, Object, Place, Purpose};
-use crate::contract::error::Result;
+use crate::contract::error::{Error, Result};
 use crate::contract::progress::Progress;
 use crate::contract::settings::Limits;
 use crate::util::parallel;
@@ -25,8 +25,8 @@ pub(crate) struct PackageFile {
     path: PathBuf,
     input: Bytes,
     model: Model,
-    /// The parts of a slicer's project that say which triangles are volumes.
-    configs: Vec<Config>,
+    /// Stretches of triangles that are bodies of their own to a slicer.
+    volumes: Volumes,
     findings: Vec<Finding>,
 }
 
@@ -57,9 +57,9 @@ impl PackageFile {
             return Ok(None);
         }
         let model = parallel::in_pool(limits.threads, || Model::open(&input, &context))?;
-        let configs = slicer::configs(&archive, &context)?;
+        let volumes = Volumes::of(&model, &archive, &context)?;
         let findings = [model.findings.clone(), left_alone(&model)].concat();
-        Ok(Some(Self { opened, path: path.to_owned(), input, model, configs, findings }))
+        Ok(Some(Self { opened, path: path.to_owned(), input, model, volumes, findings }))
     }
 
     /// The objects that are repaired: meshes of triangles that are printed, in the order of the parts and of their texts.
@@ -82,6 +82,12 @@ impl PackageFile {
         let part = self.model.parts.get(place.part).map(|part| part.name.clone()).unwrap_or_default();
         let object = self.model.object(place);
         (object.map_or(0, |object| object.id), object.map(|object| object.name.clone()).unwrap_or_default(), part)
+    }
+
+    /// An object that cannot be repaired, for this reason.
+    pub(crate) fn refused(&self, place: Place, reason: &str) -> Error {
+        let (id, _, part) = self.names(place);
+        Error::Unreadable { path: self.path.clone(), reason: format!("object {id} of the part {part} {reason}") }
     }
 
     /// The text of a part, and what stands in it between the tags of the vertices and of the triangles of an object's mesh.
@@ -116,25 +122,21 @@ impl PackageFile {
         self.model.entries.iter().position(|entry| entry.name == *name)
     }
 
-    /// All volumes of the slicer's, in the order of its text.
-    pub(crate) fn volumes(&self) -> &[Volume] {
-        self.configs.first().map_or(&[], |config| config.volumes.as_slice())
+    /// All volumes of the slicer's.
+    pub(crate) fn volumes(&self) -> &Volumes {
+        &self.volumes
     }
 
-    /// The numbers of an object's volumes. They are of objects of the first part.
+    /// The numbers of an object's volumes.
     pub(crate) fn volumes_at(&self, place: Place) -> Vec<usize> {
-        let id = self.model.object(place).map(|object| object.id).filter(|_| place.part == 0);
-        (0..self.volumes().len()).filter(|k| self.volumes().get(*k).map(|volume| volume.object) == id).collect()
+        let Some(id) = self.model.object(place).map(|object| object.id) else { return Vec::new() };
+        let all = self.volumes.all().iter().enumerate();
+        all.filter(|(_, volume)| volume.is_of(place.part, id)).map(|(number, _)| number).collect()
     }
 
     /// An object's volumes.
     pub(crate) fn volumes_of(&self, place: Place) -> Vec<&Volume> {
-        self.volumes_at(place).into_iter().filter_map(|k| self.volumes().get(k)).collect()
-    }
-
-    /// The parts that hold the volumes.
-    pub(crate) fn configs(&self) -> &[Config] {
-        &self.configs
+        self.volumes_at(place).into_iter().filter_map(|k| self.volumes.all().get(k)).collect()
     }
 
     /// The name of the unit of all coordinates.

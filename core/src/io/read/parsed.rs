@@ -27,13 +27,21 @@ pub(crate) struct Parsed {
     pub(crate) header: [u8; HEADER_BYTES],
     /// How far coordinates were moved to be `f32`, where the file holds finer ones.
     pub(crate) rounding: Option<Rounding>,
-    /// The name of the unit of all coordinates, where the file says one.
+    pub(crate) besides: Besides,
+}
+
+/// What a file says besides its triangles, where it says it.
+#[derive(Debug, Default)]
+pub(crate) struct Besides {
+    /// The name of the unit of all coordinates.
     pub(crate) unit: Option<&'static str>,
-    /// The positions that faces name by number, where the file has one table of them.
+    /// The name of the whole; without control characters.
+    pub(crate) title: String,
+    /// The positions that faces name by number, where there is one table of them.
     pub(crate) positions: Option<Positions>,
-    /// It has colours or materials in a form that no result keeps.
-    pub(crate) coloured: bool,
-    /// Meshes that are never welded to each other, one behind the other, all triangles in them; none where all of the file is one mesh.
+    /// Triangles with colours or materials in a form that no result in another format keeps.
+    pub(crate) coloured: u64,
+    /// Meshes that are never welded to each other, one behind the other, all triangles in them. Of a file of one mesh that one, if it has a name; else none.
     pub(crate) parts: Vec<Part>,
     /// A person should look at a result that is no copy, for this reason.
     pub(crate) doubt: Option<&'static str>,

@@ -5,7 +5,7 @@ use super::facets::{self, Tally};
 use super::finding::{Finding, Rejection, legible_bytes};
 use super::limits::{HEADER_BYTES, window};
 use super::number::{COMMA, POINT};
-use super::parsed::Parsed;
+use super::parsed::{Besides, Parsed};
 use super::spool::Context;
 use crate::contract::error::Result;
 use crate::io::record::Record;
@@ -35,17 +35,7 @@ pub(super) fn read(text: &[u8], start: usize, context: &Context<'_>) -> Result<P
     context.in_order(text.len() as u64, next, parse, take)?;
     judge(&tally, spool.count()).map_err(reject)?;
     let (records, findings, header) = (spool.map()?, findings(&tally), header(&tally));
-    Ok(Parsed {
-        records,
-        findings,
-        header,
-        rounding: None,
-        unit: None,
-        positions: None,
-        coloured: false,
-        parts: Vec::new(),
-        doubt: None,
-    })
+    Ok(Parsed { records, findings, header, rounding: None, besides: Besides::default() })
 }
 
 /// Bytes of records that a text will make, if it goes on as it begins.

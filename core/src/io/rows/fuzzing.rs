@@ -24,7 +24,7 @@ pub fn ask(path: &Path, limits: &Limits) -> Result<usize> {
     let mesh = MeshFile::open(path, &limits.spool_folder(), limits, &Quiet)?;
     Ok(match Said::by(&mesh) {
         Said::Rows(rows) => faces(&*rows),
-        Said::Nothing | Said::Elsewhere => 0,
+        Said::Nothing | Said::Elsewhere(_) => 0,
     })
 }
 

@@ -29,8 +29,8 @@ pub(crate) enum Said<'a> {
     Nothing,
     /// It stands in these rows.
     Rows(Box<dyn Rows + 'a>),
-    /// It stands in a form that cannot be written anew.
-    Elsewhere,
+    /// It stands in a form that cannot be written anew: of so many triangles.
+    Elsewhere(u64),
 }
 
 impl<'a> Said<'a> {
@@ -41,14 +41,23 @@ impl<'a> Said<'a> {
             Format::Ply => (vertices.and_then(|vertices| boxed(Ply::of(bytes, vertices)?)), ply::says_more(bytes)),
             Format::Off => (vertices.and_then(|vertices| boxed(Off::of(bytes, vertices)?)), off::says_more(bytes)),
             Format::Obj => (vertices.and_then(|vertices| boxed(Obj::of(bytes, vertices)?)), true),
-            Format::Amf => (None, mesh.is_coloured()),
-            _ => (None, false),
+            _ => (None, mesh.coloured() > 0),
         };
         match rows {
             Some(rows) if rows.carries() => Self::Rows(rows),
             Some(_) => Self::Nothing,
-            None if says_more => Self::Elsewhere,
+            None if says_more && mesh.coloured() > 0 => Self::Elsewhere(mesh.coloured()),
+            None if says_more => Self::Elsewhere(mesh.records().len() as u64),
             None => Self::Nothing,
+        }
+    }
+
+    /// Of how many triangles it is, in a file of so many.
+    pub(crate) fn triangles(&self, all: usize) -> u64 {
+        match self {
+            Self::Nothing => 0,
+            Self::Rows(_) => all as u64,
+            Self::Elsewhere(triangles) => *triangles,
         }
     }
 }

@@ -170,7 +170,7 @@ impl Rows for Obj<'_> {
         rows.next().is_none().then_some(all)
     }
 
-    fn has_room(&self, vertices: u64, _: u64) -> bool {
+    fn make_room(&self, vertices: u64, _: u64) -> bool {
         vertices < u64::from(NONE)
     }
 

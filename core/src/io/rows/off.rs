@@ -195,7 +195,7 @@ impl Rows for Off<'_> {
         Some(all)
     }
 
-    fn has_room(&self, vertices: u64, faces: u64) -> bool {
+    fn make_room(&self, vertices: u64, faces: u64) -> bool {
         vertices <= 1 << 31 && faces <= 1 << 31
     }
 

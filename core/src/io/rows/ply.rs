@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
+use std::sync::OnceLock;
 
 use super::cells::{self, Cells, Form};
 use super::table::{Corner, FaceRow, Faces, NONE, Rows, Source, Triangle, VERTICES};
@@ -37,6 +38,8 @@ pub(crate) struct Ply<'a> {
     positions: Vertices<'a>,
     mixes: Vec<Mix>,
     carries: bool,
+    /// The type of indices in the output, where it is wider than that of the file.
+    index: OnceLock<Scalar>,
 }
 
 /// An element where it stands.
@@ -76,7 +79,7 @@ impl<'a> Ply<'a> {
         }
         let mixes: Vec<Mix> = vertices.element.properties.iter().map(mix).collect();
         let carries = says_more(bytes);
-        Some(Self { bytes, form, head: header.end, vertices, faces, positions, mixes, carries })
+        Some(Self { bytes, form, head: header.end, vertices, faces, positions, mixes, carries, index: OnceLock::new() })
     }
 
     /// The corners of the face at a cursor.
@@ -232,25 +235,45 @@ impl Rows for Ply<'_> {
         self.vertices.element.properties.iter().any(is_of_texture)
     }
 
-    fn has_room(&self, vertices: u64, faces: u64) -> bool {
-        let of_indices = self.faces.element.properties.iter().find(|property| is_indices(property));
-        let most: u64 = match of_indices.map(|property| property.kind) {
-            Some(Scalar::I8) => 1 << 7,
-            Some(Scalar::U8) => 1 << 8,
-            Some(Scalar::I16) => 1 << 15,
-            Some(Scalar::U16) => 1 << 16,
-            Some(Scalar::I32) => 1 << 31,
-            _ => u64::from(NONE),
-        };
-        vertices <= most && faces <= u64::from(u32::MAX)
+    fn make_room(&self, vertices: u64, faces: u64) -> bool {
+        let kind = self.faces.element.properties.iter().find(|property| is_indices(property)).map(|property| property.kind);
+        let has_room = kind.is_none_or(|kind| vertices <= most_vertices(kind));
+        if !has_room && vertices <= most_vertices(Scalar::I32) {
+            return faces <= u64::from(u32::MAX) && *self.index.get_or_init(|| Scalar::I32) == Scalar::I32;
+        }
+        has_room && faces <= u64::from(u32::MAX)
+    }
+
+    fn copy(&self, range: Range<usize>, put: &mut dyn FnMut(&[u8])) {
+        let faces = self.faces.range.clone();
+        let [from, to] = [faces.start, faces.end].map(|end| end.clamp(range.start, range.end));
+        if self.index.get().is_none() || self.form == Form::Text || from >= to {
+            return put(self.bytes.get(range).unwrap_or_default());
+        }
+        put(self.bytes.get(range.start..from).unwrap_or_default());
+        self.widen(from..to, put);
+        put(self.bytes.get(to..range.end).unwrap_or_default());
     }
 
     fn head(&self, vertices: u64, faces: u64) -> (Vec<u8>, usize) {
         let head = self.bytes.get(..self.head).unwrap_or_default();
         let mut out = Vec::with_capacity(head.len() + 20);
+        let mut is_of_faces = false;
         for line in head.split_inclusive(|byte| matches!(byte, b'\r' | b'\n')) {
             let words: Vec<&[u8]> = line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty()).collect();
+            if let [b"element", name, _] = words.as_slice() {
+                is_of_faces = *name == self.faces.element.name;
+            }
             let count = match words.as_slice() {
+                [b"property", b"list", _, kind, b"vertex_indices" | b"vertex_index"]
+                    if is_of_faces && self.index.get().is_some() =>
+                {
+                    let at = kind.as_ptr() as usize - line.as_ptr() as usize;
+                    out.extend_from_slice(line.get(..at).unwrap_or_default());
+                    out.extend_from_slice(b"int");
+                    out.extend_from_slice(line.get(at + kind.len()..).unwrap_or_default());
+                    continue;
+                }
                 [b"element", name, _] if *name == self.vertices.element.name => vertices,
                 [b"element", name, _] if *name == self.faces.element.name => faces,
                 _ => {
@@ -301,13 +324,38 @@ impl Rows for Ply<'_> {
                 None if values.is_empty() => cells::put(self.form, property.kind, 0.0, out),
                 None => {}
             }
-            values.iter().for_each(|value| cells::put(self.form, property.kind, *value, out));
+            let kind = self.kind_of(property);
+            values.iter().for_each(|value| cells::put(self.form, kind, *value, out));
         }
         self.end_row(out);
     }
 }
 
 impl Ply<'_> {
+    /// The type of a property of faces in the output.
+    fn kind_of(&self, property: &Property) -> Scalar {
+        self.index.get().copied().filter(|_| is_indices(property)).unwrap_or(property.kind)
+    }
+
+    /// Gives faces on with wider indices.
+    fn widen(&self, range: Range<usize>, put: &mut dyn FnMut(&[u8])) {
+        let (mut at, mut out) = (range.start, Vec::new());
+        while at < range.end {
+            let pass = &mut |cursor: &mut dyn Cursor| self.faces.layout.steps().iter().try_for_each(|step| cursor.pass(*step));
+            // All rows were read before.
+            let Some(row) = row(self.bytes, self.form, at, pass) else { return };
+            at = row.end;
+            for (property, values) in self.faces.element.properties.iter().zip(self.cells(row).unwrap_or_default()) {
+                if let Some(length) = property.list {
+                    cells::put(self.form, length, values.len() as f64, &mut out);
+                }
+                values.iter().for_each(|value| cells::put(self.form, self.kind_of(property), *value, &mut out));
+            }
+            put(&out);
+            out.clear();
+        }
+    }
+
     /// The numbers of a face by property.
     fn cells(&self, row: Range<usize>) -> Option<Vec<Vec<f64>>> {
         let mut cells = Cells::of(self.form, self.bytes.get(row)?);
@@ -324,6 +372,18 @@ impl Ply<'_> {
             out.pop_if(|byte| *byte == b' ');
             out.push(b'\n');
         }
+    }
+}
+
+/// Most vertices that indices of this type tell apart.
+fn most_vertices(kind: Scalar) -> u64 {
+    match kind {
+        Scalar::I8 => 1 << 7,
+        Scalar::U8 => 1 << 8,
+        Scalar::I16 => 1 << 15,
+        Scalar::U16 => 1 << 16,
+        Scalar::I32 => 1 << 31,
+        Scalar::U32 | Scalar::F32 | Scalar::F64 => u64::from(NONE),
     }
 }
 

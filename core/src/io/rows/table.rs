@@ -97,8 +97,13 @@ pub(crate) trait Rows {
         false
     }
 
-    /// Indices of so many vertices, and so many faces, can be written.
-    fn has_room(&self, vertices: u64, faces: u64) -> bool;
+    /// Makes sure that indices of so many vertices, and so many faces, can be written: it may take wider indices, once. `false`: they cannot.
+    fn make_room(&self, vertices: u64, faces: u64) -> bool;
+
+    /// Gives bytes of the file on, as they are in the output. The range begins and ends between two rows.
+    fn copy(&self, range: Range<usize>, put: &mut dyn FnMut(&[u8])) {
+        put(self.bytes().get(range).unwrap_or_default());
+    }
 
     /// What stands before the rows, with these counts of vertices and faces, and where in the file it ends.
     fn head(&self, vertices: u64, faces: u64) -> (Vec<u8>, usize);

@@ -50,7 +50,7 @@ impl<'p> Planned<'p> {
         let plan = Plan::of(rows, &wanted)?;
         let end = if wanted.made.is_empty() { State::default() } else { rows.end_state() };
         let mut planned = Self { rows, change, wanted, plan, order: Vec::new(), end, account: Account::default() };
-        if !rows.has_room(planned.vertices(), planned.faces()) {
+        if !rows.make_room(planned.vertices(), planned.faces()) {
             return None;
         }
         let mut order: Vec<usize> = (0..planned.wanted.made.len()).collect();
@@ -152,12 +152,15 @@ impl Writer<'_, '_> {
     }
 
     fn copy_to(&mut self, to: usize) {
-        let bytes = self.planned.rows.bytes().get(self.at..to).unwrap_or_default();
-        for part in bytes.chunks(BATCH) {
-            self.batch.extend_from_slice(part);
-            self.flush_if_full();
+        if to > self.at {
+            self.planned.rows.copy(self.at..to, &mut |bytes| {
+                for part in bytes.chunks(BATCH) {
+                    self.batch.extend_from_slice(part);
+                    self.flush_if_full();
+                }
+            });
+            self.at = to;
         }
-        self.at = self.at.max(to);
     }
 
     /// Copies the bytes of the file up to this one, with new vertices where they belong.

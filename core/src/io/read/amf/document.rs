@@ -1,5 +1,7 @@
 //! The elements of an AMF around its vertices and triangles.
 
+use std::collections::BTreeMap;
+
 use super::super::finding::Rejection;
 use super::super::number;
 use super::super::rounding::Rounding;
@@ -83,6 +85,10 @@ pub(super) struct Document {
     /// Names or ids of the first objects, by their numbers, and names alone.
     pub(super) names: Vec<Vec<u8>>,
     pub(super) titles: Vec<Vec<u8>>,
+    /// Names of volumes, by the numbers of their meshes; [`NAMES_KEPT`] at most.
+    pub(super) volume_names: BTreeMap<usize, Vec<u8>>,
+    /// Metadata of the file and of objects, but for names.
+    pub(super) metadata: u64,
     pub(super) meshes: Vec<Mesh>,
     constellations: Vec<Constellation>,
     pub(super) instances: Vec<Instance>,
@@ -165,6 +171,12 @@ impl Document {
         self.objects.get(object).and_then(|object| self.meshes.get(object.meshes.clone())).unwrap_or_default()
     }
 
+    /// The name of a volume, by its number among the meshes of its object.
+    pub(super) fn volume_of(&self, object: usize, mesh: usize) -> Option<&[u8]> {
+        let first = self.objects.get(object)?.meshes.start;
+        self.volume_names.get(&(first + mesh)).map(Vec::as_slice)
+    }
+
     fn elements<'t>(
         &mut self,
         text: &'t [u8],
@@ -183,6 +195,9 @@ impl Document {
                             self.volume()?;
                         }
                         if !tokens.is_empty() {
+                            if kind == Kind::Triangles {
+                                self.name_volume(text, tokens);
+                            }
                             self.children((text, tokens), kind, context, intake)?;
                         }
                     }
@@ -262,6 +277,13 @@ impl Document {
         Ok(())
     }
 
+    /// Notes the name of the volume that has begun. It stands before the first triangle.
+    fn name_volume(&mut self, text: &[u8], tokens: &Tokens<'_>) {
+        let Some(mesh) = self.meshes.len().checked_sub(1).filter(|_| self.volume_names.len() < NAMES_KEPT) else { return };
+        let name = name_ahead(Tokens::from(text, tokens.at(), tokens.open().len()));
+        self.volume_names.extend(name.map(|name| (mesh, name)));
+    }
+
     /// Reads an element that has begun, or its beginning.
     fn element(&mut self, tag: Tag<'_>, tokens: &mut Tokens<'_>) -> std::result::Result<(), Stop> {
         match *tokens.open() {
@@ -298,6 +320,7 @@ impl Document {
                     names.get_mut(last).into_iter().for_each(|known| known.clone_from(&name));
                 }
             }
+            [_, b"object", b"metadata"] => self.metadata += 1,
             [.., name] => self.is_coloured |= is_colour(name),
             [] => {}
         }
@@ -307,6 +330,7 @@ impl Document {
     /// Reads what is said about the whole file.
     fn metadata(&mut self, tag: Tag<'_>, tokens: &mut Tokens<'_>) -> std::result::Result<(), Stop> {
         let of = word(&tag, b"type").unwrap_or_default();
+        self.metadata += u64::from(of != b"name");
         if of.starts_with(b"slic3r") {
             self.radians = true;
         } else if of == b"name" && self.name.is_empty() {
@@ -372,6 +396,21 @@ impl Instance {
 
 fn word(tag: &Tag<'_>, name: &[u8]) -> Option<Vec<u8>> {
     tag.attribute(name, LONGEST_WORD)
+}
+
+/// The name among the metadata that come next.
+fn name_ahead(mut tokens: Tokens<'_>) -> Option<Vec<u8>> {
+    loop {
+        match tokens.next().ok()?? {
+            Token::Start(tag) if tag.name != b"metadata" => return None,
+            Token::Start(tag) if word(&tag, b"type").as_deref() == Some(b"name") => {
+                return tokens.content(LONGEST_NAME).ok().filter(|name| !name.is_empty());
+            }
+            Token::Start(_) => tokens.skip().ok()?,
+            Token::End => return None,
+            Token::Text(_) | Token::Data(_) | Token::Aside => {}
+        }
+    }
 }
 
 fn hashed(id: Vec<u8>) -> Id {

@@ -31,7 +31,7 @@ use super::binary;
 use super::finding::{Finding, Loss, Rejection};
 use super::limits::most_copies;
 use super::number::COMMA;
-use super::parsed::{Parsed, Part};
+use super::parsed::{Besides, Parsed, Part};
 use super::spool::Context;
 use crate::contract::error::Result;
 use crate::util::words::{Count, Counted};
@@ -96,22 +96,17 @@ pub(super) fn read(text: &[u8], bytes: usize, context: &Context<'_>) -> Result<P
     let header = binary::header_of(name);
     // What is left of a file may be half a mesh: then nobody knows what belongs together.
     let is_whole = findings.iter().all(|finding| finding.loss == Loss::None);
-    let parts = if is_whole && placed.parts.len() > 1 { parts(&document, &placed.parts) } else { Vec::new() };
+    let parts = if is_whole || !placed.several { parts(&document, &placed.parts) } else { Vec::new() };
     let united = parts.is_empty() && placed.several;
+    let parts = if parts.iter().all(|part| part.name.is_empty()) && !placed.several { Vec::new() } else { parts };
     findings.extend(of_objects(&document, &placed, united));
     let (records, rounding) = (placed.records, placed.rounding.if_any());
-    let coloured = document.is_coloured || notes.colours > 0;
-    Ok(Parsed {
-        records,
-        findings,
-        header,
-        rounding,
-        unit: unit_of(&document),
-        positions: None,
-        coloured,
-        parts,
-        doubt: doubt(united, notes.roles),
-    })
+    // Colours of the file, of objects, volumes, vertices and triangles count for one another: nobody knows whose they are.
+    let is_coloured = document.is_coloured || notes.colours > 0;
+    let coloured = if is_coloured { records.all().len() as u64 } else { 0 };
+    let (unit, title, doubt) = (unit_of(&document), title(&document.name), doubt(united, notes.roles));
+    let besides = Besides { unit, title, positions: None, coloured, parts, doubt };
+    Ok(Parsed { records, findings, header, rounding, besides })
 }
 
 /// Why somebody should look at a repair of such a file.
@@ -130,7 +125,13 @@ fn parts(document: &Document, parts: &[PartOf]) -> Vec<Part> {
     let named = |part: &PartOf| {
         let own = document.titles.get(part.object).map(|name| title(name)).unwrap_or_default();
         let volumes = document.meshes(part.object).iter().filter(|mesh| !mesh.indices.is_empty()).count();
-        let name = if volumes > 1 { format!("{own} volume {}", part.mesh + 1) } else { own };
+        let of_volume = document.volume_of(part.object, part.mesh).map(title);
+        let name = match of_volume {
+            Some(name) if volumes > 1 => format!("{own} {name}"),
+            Some(name) if own.is_empty() => name,
+            None if volumes > 1 => format!("{own} volume {}", part.mesh + 1),
+            _ => own,
+        };
         Part { name: name.trim().into(), triangles: part.triangles.clone() }
     };
     parts.iter().map(named).collect()
@@ -205,6 +206,10 @@ fn of_text(document: &Document, notes: &Notes, behind: &[u8]) -> Vec<Finding> {
     if notes.roles > 0 {
         let volumes = Counted(notes.roles, "volume is a modifier", "volumes are modifiers");
         found.push(harmless(format!("{volumes}, negative or support to a slicer, read as mesh")));
+    }
+    if document.metadata + notes.metadata > 0 {
+        let entries = Counted(document.metadata + notes.metadata, "entry", "entries");
+        found.push(harmless(format!("{entries} of metadata besides names, which stay in a copy alone")));
     }
     if document.supports > 0 {
         let volumes = Counted(document.supports, "volume", "volumes");

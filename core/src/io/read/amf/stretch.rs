@@ -59,6 +59,8 @@ pub(super) struct Notes {
     pub(super) colours: u64,
     /// Volumes that are no part of the model to a slicer.
     pub(super) roles: u64,
+    /// Metadata of volumes, but for names.
+    pub(super) metadata: u64,
     /// [`POINT`] and [`COMMA`], as they were seen.
     pub(super) separators: u8,
 }
@@ -73,6 +75,7 @@ impl Notes {
         self.edges += behind.edges;
         self.colours += behind.colours;
         self.roles += behind.roles;
+        self.metadata += behind.metadata;
         self.separators |= behind.separators;
     }
 
@@ -168,6 +171,7 @@ impl Stretch {
                 (Kind::Triangles, b"metadata") => {
                     let of = tag.attribute(b"type", LONGEST_NUMBER).unwrap_or_default();
                     let value = tokens.content(LONGEST_NUMBER)?;
+                    self.notes.metadata += u64::from(of != b"name");
                     self.notes.roles += u64::from(is_role(&of, value.trim_ascii()));
                 }
                 _ => {

@@ -21,7 +21,7 @@ use super::finding::{Finding, Rejection, legible_bytes};
 use super::foreign;
 use super::limits::window;
 use super::number::{COMMA, POINT};
-use super::parsed::Parsed;
+use super::parsed::{Besides, Parsed};
 use super::spool::{Context, POSITION_BYTES};
 use super::vertices::{Positions, Vertices};
 use crate::contract::error::Result;
@@ -127,17 +127,7 @@ pub(super) fn read(bytes: &[u8], start: usize, context: &Context<'_>) -> Result<
     findings.extend(tally.findings());
     let (header, rounding) = (header(&found), found.rounding.if_any());
     let positions = Some(Positions::Spooled(positions));
-    Ok(Parsed {
-        records: records.map()?,
-        findings,
-        header,
-        rounding,
-        unit: None,
-        positions,
-        coloured: false,
-        parts: Vec::new(),
-        doubt: None,
-    })
+    Ok(Parsed { records: records.map()?, findings, header, rounding, besides: Besides { positions, ..Besides::default() } })
 }
 
 fn windows_at_a_time() -> usize {

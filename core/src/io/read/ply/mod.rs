@@ -17,7 +17,7 @@ use self::header::Form;
 use self::roles::{Part, Role};
 use super::elements::{points, polygons};
 use super::finding::{Finding, Rejection};
-use super::parsed::Parsed;
+use super::parsed::{Besides, Parsed};
 use super::spool::Context;
 use super::vertices::{Positions, Vertices};
 use super::{binary, tail};
@@ -205,11 +205,7 @@ impl<'a> Reading<'a, '_> {
             findings: self.findings,
             header,
             rounding,
-            unit: None,
-            positions: Some(positions),
-            coloured: false,
-            parts: Vec::new(),
-            doubt: None,
+            besides: Besides { positions: Some(positions), ..Besides::default() },
         })
     }
 }

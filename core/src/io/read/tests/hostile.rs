@@ -175,6 +175,26 @@ fn f14_archives_as_a_whole_are_no_bombs() {
     // An archive in an archive in an archive is not looked into.
     let nested = (0..5).fold(b"x".to_vec(), |inner, _| zip(&[member("0.zip", inner)]));
     assert!(reason(&nested).contains("neither a 3MF package nor a packed AMF: it holds \"0.zip\""));
+    // A mesh beside a text is one; of two meshes, nobody knows which is meant.
+    let [mesh, readme] = [member("part.amf", amf(&amf_object(1))), member("README.txt", "hello")];
+    let file = open(&zip(&[readme.clone(), mesh.clone()])).unwrap();
+    assert_eq!((file.format(), texts(&file)), (Format::Amf, vec!["1 other file in the archive, of which only a copy has any"]));
+    let other = Member { name: b"other.amf".to_vec(), ..mesh.clone() };
+    assert!(reason(&zip(&[mesh, other])).contains("neither a 3MF package nor a packed AMF"));
+}
+
+#[test]
+fn f14_characters_that_xml_does_not_have_are_refused() {
+    let named = |name: &str| {
+        package(&object(1, MESH).replacen("<object", &format!("<object name='{name}'"), 1), "<item objectid='1'/>", &[])
+    };
+    for name in ["&#27;[2J", "a&#x1;", "&#xFFFE;"] {
+        let said = reason(&named(name));
+        assert!(said.contains("holds a control character, which XML does not allow"), "{name}: {said}");
+    }
+    for name in ["a&#9;b", "&#xe9;", "&#x1F600;"] {
+        assert_eq!(triangles(&open(&named(name)).unwrap()), [CORNERS], "{name}");
+    }
 }
 
 #[test]

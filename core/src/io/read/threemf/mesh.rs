@@ -6,7 +6,7 @@ use std::ops::Range;
 
 use super::super::binary;
 use super::super::limits::window;
-use super::super::parsed::Parsed;
+use super::super::parsed::{Besides, Parsed};
 use super::super::spool::{Context, Items, POSITION_BYTES, Spool};
 use super::super::vertices::Vertices;
 use super::careful::{self, Piece};
@@ -68,17 +68,7 @@ impl Model {
         let mut findings = points.findings();
         findings.extend(told.findings());
         let header = binary::header_of(object.name.as_bytes());
-        let parsed = Parsed {
-            records,
-            findings,
-            header,
-            rounding: points.rounding.if_any(),
-            unit: None,
-            positions: None,
-            coloured: false,
-            parts: Vec::new(),
-            doubt: None,
-        };
+        let parsed = Parsed { records, findings, header, rounding: points.rounding.if_any(), besides: Besides::default() };
         let TriangleCounts { tally, with_any, .. } = told;
         Ok(MeshRecords { parsed, positions, triangles: tally.faces, with_any })
     }

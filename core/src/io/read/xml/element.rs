@@ -115,5 +115,8 @@ impl<'a> Element<'a> {
 
 /// A value without references.
 fn plain(value: &str) -> Result<Cow<'_, str>, String> {
-    unescape(value).map_err(|_| "refers to an entity or a character that is not there".into())
+    let plain = unescape(value).map_err(|_| "refers to an entity or a character that is not there".to_owned())?;
+    // Section 2.2: no character of XML, not even by a reference.
+    let is_none = |c: char| c < ' ' && !matches!(c, '\t' | '\n' | '\r') || matches!(c, '\u{fffe}' | '\u{ffff}');
+    if plain.contains(is_none) { Err("holds a control character, which XML does not allow".into()) } else { Ok(plain) }
 }

@@ -18,7 +18,7 @@ use suture_store::{Claim, Job, JobId, JobStore, State, Step, StoreError, crash_p
 
 use crate::carry::is_carried;
 use crate::choice;
-use crate::claim::{CLAIMED, Claimed, Unclaimed, claim};
+use crate::claim::{CLAIMED, Claimed, Unclaimed, claim, let_go};
 use crate::config::Config;
 use crate::create;
 use crate::event::Happening;
@@ -242,6 +242,9 @@ impl Slot {
             (State::Running { .. }, _) => Step::Environment { reason },
             (state, _) => Step::Park { reason, committed: self.committed.take() || matches!(state, State::Published { .. }) },
         };
+        if let (State::Running { .. }, Some(folder)) = (&job.state, self.context.folder(job)) {
+            let_go(folder, claim.token);
+        }
         self.context.store.advance(claim, step).map(Some)
     }
 
@@ -341,7 +344,10 @@ impl Slot {
             // Of the right folder: where a mount is gone, the file is not to be seen, and has not changed.
             folder.check().map_err(PublishError::Folder)?;
         }
-        Ok(Some(context.store.advance(token, step)?))
+        let_go(folder, token.token);
+        let next = context.store.advance(token, step)?;
+        crash_point("daemon.given_back");
+        Ok(Some(next))
     }
 
     fn work(&mut self, folder: &Folder, claim: &Claim, job: &Job, claimed: &Claimed, turn: Turn) -> Worked {

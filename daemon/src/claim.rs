@@ -12,8 +12,8 @@ use std::path::{Path, PathBuf};
 
 use rustix::fs::{AtFlags, CWD};
 use suture_core::ErrorClass;
-use suture_store::Job;
 use suture_store::job::Withdrawal;
+use suture_store::{Job, Token};
 
 use crate::create;
 use crate::folder::{Folder, make_parent};
@@ -134,6 +134,16 @@ pub(crate) fn claim(folder: &Folder, job: &Job, work: &Path, free: u64) -> Resul
     // A new folder: what is in it, this attempt has put there.
     make_parent(work).and_then(|()| std::fs::create_dir(work)).map_err(failed("the work folder cannot be made"))?;
     take(original, job, &work.join(CLAIMED))
+}
+
+/// Gives the second name of an attempt's original up. That changes the time of the inode, which another attempt would take for a change of the file:
+/// so it comes before the job can be claimed once more.
+pub(crate) fn let_go(folder: &Folder, attempt: Token) {
+    // Another daemon may have the folder, and a work folder of that name in it.
+    if folder.check().is_ok() {
+        // What stays goes with the folder; then a second attempt at worst begins anew.
+        let _ = fsx::remove_if_there(&folder.work(attempt).join(CLAIMED));
+    }
 }
 
 fn open(path: &Path) -> Result<Original, Unclaimed> {

@@ -39,7 +39,7 @@ fn state(hot: &Hot) -> BTreeMap<&'static str, Tree> {
     let mut parts: BTreeMap<_, _> = PARTS.iter().chain(&["in"]).map(|part| (*part, hot.tree(part))).collect();
     for (name, bytes) in parts.values_mut().flatten() {
         if name.ends_with(".json") {
-            serde_json::from_slice::<serde_json::Value>(bytes).unwrap_or_else(|e| panic!("{name} is not whole: {e}"));
+            serde_json::from_slice::<Value>(bytes).unwrap_or_else(|e| panic!("{name} is not whole: {e}"));
             bytes.clear();
         }
     }
@@ -335,7 +335,7 @@ fn f10_killers_are_quarantined_and_the_others_go_on() {
     assert_eq!(hot.tree("out").keys().collect::<Vec<_>>(), ["part.stl", "part.stl.report.json", "part.stl.suture.json"]);
     for name in killers {
         let report = &hot.tree("quarantine")[&format!("{name}.report.json")];
-        let report: serde_json::Value = serde_json::from_slice(report).unwrap();
+        let report: Value = serde_json::from_slice(report).unwrap();
         assert_eq!(report["outcome"], "quarantined", "{report}");
         assert!(report["attempts"].as_u64().is_some_and(|attempts| attempts <= 3 + 3), "{report}");
         assert!(name != "d!kill-daemon!.stl" || report["attempts"] == 3, "{report}");

@@ -50,6 +50,21 @@ fn f03_a_worker_that_is_killed_costs_its_file_nothing() {
     assert_at_rest(&hot, "killed workers");
 }
 
+/// Another attempt may begin as soon as a job is given back: what is cleared away after that must not touch the inode of the original, whose change
+/// would be taken for one of the file.
+#[test]
+fn f03_an_attempt_has_let_go_of_its_file_when_its_job_is_given_back() {
+    let hot = Hot::new(with_crash_points());
+    hot.put("part!abort!.stl", &mesh(Case::Clean, 1));
+    let status = hot.watch(&["--once"]).env("SUTURE_CRASH_AT", "daemon.given_back:1").status().expect("the daemon starts");
+    assert!(was_killed(status), "{status}");
+    let names = |folder: &str| hot.tree(folder).into_keys().collect::<Vec<_>>();
+    let (left, jobs) = (names(".suture/work"), hot.jobs());
+    assert_eq!(std::fs::read_dir(hot.path().join(".suture/work")).unwrap().count(), 1, "the attempt's folder is there still");
+    assert!(left.iter().all(|name| !name.ends_with("in.stl")), "{jobs:?}: {left:?}");
+    assert_eq!(names("in"), ["part!abort!.stl"]);
+}
+
 /// A worker that tries to read a file beside its work, and a program, and aborts if it can.
 #[test]
 fn a_worker_reaches_nothing_but_its_work() {

@@ -320,6 +320,23 @@ fn untouched_rows_stay_byte_for_byte() {
     assert!(output.contains(&format!("element face {}\n", 5 + output.matches("\n4 0 1 5 4\n").count() + triangles)), "{output}");
 }
 
+/// Found by fuzzing. A row that is new would have the number that faces name in vain, and give them a place in the texture that they never had.
+#[test]
+fn numbers_of_rows_that_are_not_there_stay_without_a_meaning() {
+    let mesh = Mesh::of(&crossing());
+    let whole = obj(&mesh, |k| k as u8);
+    let rows: Vec<&str> = whole.lines().filter(|line| line.starts_with("vt ")).collect();
+    for left in [0, rows.len() - 1] {
+        let lines = whole.lines().filter(|line| !rows[left..].contains(line));
+        let text: String = lines.map(|line| format!("{line}\n")).collect();
+        let result = repaired("obj", text.as_bytes(), &Profile::default());
+        let output = String::from_utf8(result.output).unwrap();
+        assert!(result.report.outcome.is_good() && result.report.attributes.is_some_and(|own| own.divided > 0));
+        assert_eq!(output.matches("\nvt ").count(), left, "{output}");
+        assert!(output.starts_with("# made by a test\nmtllib part.mtl\n") && output.matches("usemtl").count() >= 12, "{output}");
+    }
+}
+
 /// Of 128 vertices, the last one that a signed byte tells apart: where the result has more, it is the same as that of a file with wider indices.
 #[test]
 fn indices_become_wider_where_vertices_are_new() {

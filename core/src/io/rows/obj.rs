@@ -3,9 +3,10 @@
 //! New rows and faces stand at the end of the file, so that no number in it becomes another one, and no face names a row behind it.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::cells::{number, put_decimal};
-use super::table::{Corner, FaceRow, Faces, NONE, Rows, State, TEXTURE, Triangle, VERTICES};
+use super::table::{CHANNELS, Corner, FaceRow, Faces, NONE, Rows, State, TEXTURE, Triangle, VERTICES};
 use super::values::Mix;
 use crate::io::read::Vertices;
 use crate::io::read::obj::line::Cursor;
@@ -25,6 +26,8 @@ pub(crate) struct Obj<'a> {
     positions: Vertices<'a>,
     counts: Corner,
     carries: bool,
+    /// By channel: a face that was passed names a row that is not there.
+    astray: [AtomicBool; CHANNELS],
 }
 
 impl<'a> Obj<'a> {
@@ -43,7 +46,13 @@ impl<'a> Obj<'a> {
             }
             cursor.skip_line();
         }
-        (counts[VERTICES] as usize == positions.len()).then_some(Self { text, positions, counts, carries })
+        (counts[VERTICES] as usize == positions.len()).then_some(Self {
+            text,
+            positions,
+            counts,
+            carries,
+            astray: Default::default(),
+        })
     }
 
     /// The line of a statement that holds; empty for none.
@@ -60,13 +69,32 @@ fn channel(keyword: &[u8]) -> Option<usize> {
     ROWS.iter().position(|own| *own == keyword)
 }
 
-struct ObjFaces<'a> {
+struct ObjFaces<'r, 'a> {
+    obj: &'r Obj<'a>,
     cursor: Cursor<'a>,
     so_far: Corner,
     state: State,
 }
 
-impl Faces for ObjFaces<'_> {
+impl<'r, 'a> ObjFaces<'r, 'a> {
+    fn of(obj: &'r Obj<'a>) -> Self {
+        Self { obj, cursor: Cursor::of(obj.text), so_far: [0; 3], state: State::default() }
+    }
+
+    /// Takes numbers of rows that are not there for none. Programs write `1/1/1` where they have written no texture vertex at all.
+    fn leave_out(&self, corner: Corner) -> Corner {
+        let mut there = corner;
+        for ((number, count), astray) in there.iter_mut().zip(self.obj.counts).zip(&self.obj.astray).skip(1) {
+            if *number != NONE && *number >= count {
+                *number = NONE;
+                astray.store(true, Ordering::Relaxed);
+            }
+        }
+        there
+    }
+}
+
+impl Faces for ObjFaces<'_, '_> {
     fn next_face(&mut self, row: &mut FaceRow) -> Option<()> {
         loop {
             let keyword = self.cursor.keyword()?;
@@ -74,7 +102,7 @@ impl Faces for ObjFaces<'_> {
             if matches!(keyword, b"f" | b"fo") {
                 row.corners.clear();
                 while let Some(word) = self.cursor.word() {
-                    row.corners.push(corner(word, self.so_far)?);
+                    row.corners.push(self.leave_out(corner(word, self.so_far)?));
                 }
                 self.cursor.end();
                 (row.whole, row.state) = (from..self.cursor.at, self.state);
@@ -129,7 +157,7 @@ impl Rows for Obj<'_> {
     }
 
     fn faces(&self) -> Box<dyn Faces + '_> {
-        Box::new(ObjFaces { cursor: Cursor::of(self.text), so_far: [0; 3], state: State::default() })
+        Box::new(ObjFaces::of(self))
     }
 
     fn says(&self, row: &FaceRow) -> Vec<u8> {
@@ -168,6 +196,10 @@ impl Rows for Obj<'_> {
             cursor.skip_line();
         }
         rows.next().is_none().then_some(all)
+    }
+
+    fn may_grow(&self, channel: usize) -> bool {
+        self.astray.get(channel).is_none_or(|astray| !astray.load(Ordering::Relaxed))
     }
 
     fn make_room(&self, vertices: u64, _: u64) -> bool {
@@ -212,7 +244,7 @@ impl Rows for Obj<'_> {
     }
 
     fn end_state(&self) -> State {
-        let mut faces = ObjFaces { cursor: Cursor::of(self.text), so_far: [0; 3], state: State::default() };
+        let mut faces = ObjFaces::of(self);
         let mut row = FaceRow::default();
         while faces.next_face(&mut row).is_some() {}
         faces.state

@@ -97,6 +97,11 @@ pub(crate) trait Rows {
         false
     }
 
+    /// New rows of a channel get numbers that no face names yet. To be asked when all faces were passed.
+    fn may_grow(&self, _channel: usize) -> bool {
+        true
+    }
+
     /// Makes sure that indices of so many vertices, and so many faces, can be written: it may take wider indices, once. `false`: they cannot.
     fn make_room(&self, vertices: u64, faces: u64) -> bool;
 

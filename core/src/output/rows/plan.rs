@@ -115,7 +115,7 @@ impl Planner<'_> {
 
     /// The row of another channel there.
     fn between(&mut self, channel: usize, number: u32, parent: &Parent, weights: [f64; 3]) -> u32 {
-        if parent.corners.iter().any(|corner| corner[channel] == NONE) {
+        if !self.rows.may_grow(channel) || parent.corners.iter().any(|corner| corner[channel] == NONE) {
             return NONE;
         }
         let parts = parts(parent, channel, weights);
@@ -137,7 +137,7 @@ impl Planner<'_> {
         let new: Vec<(usize, [u32; 3])> =
             (0..).zip(&self.wanted.made).filter(|(_, made)| made.from == From::Rim).map(|(k, made)| (k, made.corners)).collect();
         let faces: Vec<[u32; 3]> = new.iter().map(|(_, corners)| *corners).collect();
-        for channel in [VERTICES, TEXTURE] {
+        for channel in [VERTICES, TEXTURE].into_iter().filter(|channel| self.rows.may_grow(*channel)).collect::<Vec<_>>() {
             let known = |number: u32| {
                 let there = self.wanted.there(number).or(self.first.get(&number).copied());
                 there.map(|corner| corner[channel]).filter(|row| *row != NONE)

@@ -16,6 +16,7 @@
 mod algorithms;
 mod attributes;
 mod contract;
+pub mod curves;
 mod detect;
 mod diagnosis;
 mod engine;

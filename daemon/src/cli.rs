@@ -11,7 +11,7 @@ use suture_store::Priority;
 use suture_store::job::Kind;
 
 use crate::units::{parse_duration, parse_format, parse_listen, parse_size};
-use service::{CompletionsArgs, ManArgs, NightArgs, StatusArgs, StoreArgs, TopArgs};
+use service::{CompletionsArgs, CurvesArgs, ManArgs, NightArgs, StatusArgs, StoreArgs, TopArgs};
 
 pub(crate) mod service;
 
@@ -53,6 +53,8 @@ pub(crate) enum Command {
     Inspect(InspectArgs),
     /// Write a mesh in another format, and change nothing of it
     Convert(ConvertArgs),
+    /// Say which curves are in IGES, STEP or JSON files, and which closed loops they form
+    Curves(CurvesArgs),
     /// Serve a hot folder: repair whatever is dropped into DIR/in
     #[command(long_about = WATCH_HELP)]
     Watch(WatchArgs),

@@ -18,6 +18,7 @@ mod control;
 mod convert;
 mod course;
 mod create;
+mod curves;
 mod deliver;
 mod demo;
 mod draft;
@@ -115,6 +116,7 @@ fn main() -> ExitCode {
         Command::Repair(args) => single::repair(args),
         Command::Inspect(args) => single::inspect(args),
         Command::Convert(args) => convert::run(args),
+        Command::Curves(args) => curves::run(args),
         Command::Worker(args) => match worker::serve(args) {
             Ok(()) => Exit::Good,
             Err(error) => {

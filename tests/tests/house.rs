@@ -15,9 +15,10 @@ use std::path::{Path, PathBuf};
 use imports::Imports;
 
 /// The folders of the engine, each of which may import those before it, and only those.
-const ROOMS: [&str; 14] = [
+const ROOMS: [&str; 15] = [
     "util",
     "contract",
+    "curves",
     "attributes",
     "io",
     "geometry",

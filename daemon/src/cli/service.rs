@@ -1,4 +1,4 @@
-//! The command line of what runs beside the daemon: how it stands, and what a packager needs.
+//! The command line of what runs beside the daemon and beside repairs: how it stands, what curves are in a file, and what a packager needs.
 
 use std::path::PathBuf;
 use std::time::Duration;
@@ -18,6 +18,27 @@ pub(crate) struct StatusArgs {
     /// End with 1 unless a daemon runs that takes files: for whoever looks after it
     #[arg(long)]
     pub ready: bool,
+}
+
+#[derive(Args, Debug)]
+pub(crate) struct CurvesArgs {
+    /// Files of curves: IGES, STEP, or JSON of knots and control points
+    #[arg(value_name = "FILE", required = true)]
+    pub files: Vec<PathBuf>,
+    /// Ends no farther apart are the same point, in the unit of the file [default: derived from the file]
+    #[arg(long, value_name = "LENGTH", value_parser = parse_length)]
+    pub tolerance: Option<f64>,
+    /// Close open ends by straight curves, the nearest two first, none longer than this, in the unit of the file
+    #[arg(long, value_name = "LENGTH", value_parser = parse_length)]
+    pub close_gaps: Option<f64>,
+    /// Print JSON, a line for each file
+    #[arg(long)]
+    pub json: bool,
+}
+
+fn parse_length(text: &str) -> Result<f64, String> {
+    let length = text.parse::<f64>().ok().filter(|length| length.is_finite() && *length >= 0.0);
+    length.ok_or_else(|| "a length, as 0.01".into())
 }
 
 #[derive(Args, Debug)]

@@ -3,12 +3,14 @@
 //! A target fails on a panic, on more memory than [`MOST_MEMORY`], on a reading that differs from the first one of the same bytes, and on a
 //! report that is no report. libFuzzer adds the time.
 //!
-//! The readers are the engine's own files, those of its folder `io` and of the folders that this one may import.
+//! The readers are the engine's own files, those of its folders `io` and `curves` and of the folders that this one may import.
 
 #[path = "../../../core/src/attributes/mod.rs"]
 mod attributes;
 #[path = "../../../core/src/contract/mod.rs"]
 mod contract;
+#[path = "../../../core/src/curves/mod.rs"]
+mod curves;
 #[path = "../../src/forms.rs"]
 mod forms;
 #[path = "../../../core/src/io/mod.rs"]
@@ -101,6 +103,32 @@ pub fn check_rows(reader: Reader, bytes: &[u8]) {
     let limits = Limits { spool: Some(SPOOLS.into()), ..limits(1) };
     // Bytes that another reader takes are that one's.
     let _ = within_bounds(bytes.len(), || rows::ask(file.path(), &limits));
+}
+
+/// Reads curves, twice, and finds their loops, lengths and exact forms.
+pub fn check_curves(bytes: &[u8]) {
+    let read = || within_bounds(bytes.len(), || curves::read(bytes));
+    let (network, again) = match (read(), read()) {
+        (Ok(network), Ok(again)) => (network, again),
+        (Err(first), Err(again)) => {
+            assert_eq!(first, again);
+            return one_line(&first.to_string());
+        }
+        _ => panic!("two readings of the same bytes differ"),
+    };
+    assert!(network == again, "two readings of the same bytes differ");
+    network.findings.iter().for_each(|finding| one_line(&finding.text));
+    for closes_gaps in [false, true] {
+        let options = curves::loops::Options { closes_gaps, ..Default::default() };
+        let loops = within_bounds(bytes.len(), || curves::loops::find(&network, &options));
+        let count = network.curves.len() + loops.added.len();
+        assert!(loops.loops.iter().flat_map(|own| &own.uses).all(|own| own.curve < count), "a loop is of curves that are there");
+    }
+    for curve in network.curves.iter().take(64) {
+        let length = curve.shape.length(1e-6);
+        assert!(length >= 0.0, "a length of {length}");
+        let _ = curve.shape.to_spline();
+    }
 }
 
 /// A packed AMF around `text`, as it is.

@@ -31,7 +31,65 @@ pub fn all() -> Vec<(&'static str, Vec<Vec<u8>>)> {
         ),
         ("threemf_model", models(&boxes)),
         ("threemf_parts", vec![parts(&boxes)]),
+        ("iges", vec![iges(&IGES), iges(&[])]),
+        ("step", STEP.map(|data| step(data).into_bytes()).to_vec()),
     ]
+}
+
+/// Entities of an IGES: type, form, matrix, parameters.
+type Entity<'a> = (u32, u32, u32, &'a str);
+
+const IGES: [Entity<'_>; 8] = [
+    (110, 0, 0, "0.,0.,0.,10.,0.,0."),
+    (100, 0, 5, "0.,10.,5.,10.,0.,0.,5."),
+    (124, 0, 0, "1.,0.,0.,0.,0.,1.,0.,0.,0.,0.,1.,0."),
+    (126, 0, 0, "2,2,1,0,1,0,0.,0.,0.,1.,1.,1.,1.,.5,1.,0.,10.,0.,-5.,5.,0.,0.,0.,0.,0.,1.,0.,0.,1."),
+    (102, 0, 0, "3,1,3,7"),
+    (106, 12, 0, "2,3,0.,0.,0.,1.,0.,0.,1.,1.,0."),
+    (104, 1, 0, "1.,0.,4.,0.,0.,-4.,0.,2.,0.,0.,1."),
+    (112, 0, 0, "3,1,3,1,0.,1.,0.,1.,0.,0.,0.,1.,0.,0.,0.,0.,0.,0.,0.,1.,0.,0.,0.,1.,0.,0.,0.,0.,0.,0.,0."),
+];
+
+/// Fixed cards of these entities.
+fn iges(entities: &[Entity<'_>]) -> Vec<u8> {
+    let card = |data: &str, section: char, number: usize| format!("{data:<72}{section}{number:>7}\n");
+    let mut text = card("by hand", 'S', 1);
+    text += &card(",,4HPART,5Hp.igs,1Ha,1Hb,32,38,6,308,15,,1.0,2,2HMM,1,0.01;", 'G', 1);
+    let (mut directory, mut parameters) = (String::new(), String::new());
+    let mut line = 1;
+    for (at, (kind, form, matrix, values)) in entities.iter().enumerate() {
+        let (number, record) = (2 * at + 1, format!("{kind},{values};"));
+        let lines: Vec<&[u8]> = record.as_bytes().chunks(64).collect();
+        let first = format!("{kind:>8}{line:>8}{:>8}{:>8}{:>8}{:>8}{matrix:>8}{:>8}00000000", 0, 0, 0, 0, 0);
+        directory += &card(&first, 'D', number);
+        directory += &card(&format!("{kind:>8}{:>8}{:>8}{:>8}{form:>8}", 0, 0, lines.len()), 'D', number + 1);
+        for part in lines {
+            parameters += &card(&format!("{:<64}{number:>8}", String::from_utf8_lossy(part)), 'P', line);
+            line += 1;
+        }
+    }
+    (text + &directory + &parameters + &card("S      1G      1", 'T', 1)).into_bytes()
+}
+
+const STEP: [&str; 3] = [
+    "#9=VECTOR('',#6,2.);#10=LINE('',#1,#9);#11=CIRCLE('',#7,1.);#12=TRIMMED_CURVE('',#11,(#2),(PARAMETER_VALUE(90.)),.T.,.CARTESIAN.);#13=(BOUNDED_CURVE()\
+     B_SPLINE_CURVE(2,(#1,#2,#3),.UNSPECIFIED.,.F.,.F.)B_SPLINE_CURVE_WITH_KNOTS((3,3),(0.,1.),.UNSPECIFIED.)CURVE()GEOMETRIC_REPRESENTATION_ITEM()\
+     RATIONAL_B_SPLINE_CURVE((1.,.5,1.))REPRESENTATION_ITEM(''));#14=COMPOSITE_CURVE('',(#15,#16),.F.);#15=COMPOSITE_CURVE_SEGMENT(.CONTINUOUS.,.T.,#12);\
+     #16=COMPOSITE_CURVE_SEGMENT(.CONTINUOUS.,.F.,#13);#8=GEOMETRIC_CURVE_SET('a\\X2\\00E9\\X0\\''',(#10,#12,#13,#14));",
+    "#9=VERTEX_POINT('',#1);#10=VERTEX_POINT('',#2);#11=VECTOR('',#6,1.);#12=LINE('',#1,#11);#13=EDGE_CURVE('',#9,#10,#12,.T.);#14=CIRCLE('',#7,1.);\
+     #15=EDGE_CURVE('',#10,#9,#14,.F.);#16=ORIENTED_EDGE('',*,*,#13,.T.);#17=ORIENTED_EDGE('',*,*,#15,.T.);#18=EDGE_LOOP('',(#16,#17));\
+     #19=FACE_OUTER_BOUND('',#18,.T.);#20=PLANE('',#7);#21=ADVANCED_FACE('',(#19),#20,.T.);#22=OPEN_SHELL('',(#21));#8=SHELL_BASED_SURFACE_MODEL('',(#22));",
+    "#8=MAPPED_ITEM('',#9,#7);#9=REPRESENTATION_MAP(#7,#10);#10=SHAPE_REPRESENTATION('',(#8,#11),#90);#11=POLYLINE('',(#1,#2,#3,#1)); /* itself */",
+];
+
+/// A file of these instances besides some points, axes and units; `#8` is what is shown.
+fn step(data: &str) -> String {
+    format!(
+        "ISO-10303-21;\nHEADER;\nFILE_DESCRIPTION((''),'2;1');\nENDSEC;\nDATA;\n#1=CARTESIAN_POINT('',(0.,0.,0.));#2=CARTESIAN_POINT('',(1.,0.,0.));\
+         #3=CARTESIAN_POINT('',(0.,1.E0,0.));#5=DIRECTION('',(0.,0.,1.));#6=DIRECTION('',(1.,0.,0.));#7=AXIS2_PLACEMENT_3D('',#1,#5,#6);\n{data}\n\
+         #90=(GEOMETRIC_REPRESENTATION_CONTEXT(3)GLOBAL_UNIT_ASSIGNED_CONTEXT((#91))REPRESENTATION_CONTEXT('',''));\
+         #91=(LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT(.MILLI.,.METRE.));#99=SHAPE_REPRESENTATION('',(#8),#90);\nENDSEC;\nEND-ISO-10303-21;\n"
+    )
 }
 
 const TEXT: [&str; 2] = [

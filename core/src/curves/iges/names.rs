@@ -1,0 +1,48 @@
+//! Names of types of entities for people.
+
+/// What a type is called; its number first, as files call it.
+pub(super) fn name(kind: u32, form: u32) -> String {
+    let name = match kind {
+        0 => "null",
+        106 if form < 11 => "points",
+        106 => "drawing of points",
+        108 => "plane",
+        110 => "unbounded line",
+        114 => "parametric spline surface",
+        116 => "point",
+        118 => "ruled surface",
+        120 => "surface of revolution",
+        122 => "tabulated cylinder",
+        123 => "direction",
+        125 => "flash",
+        128 => "rational B-spline surface",
+        130 => "offset curve",
+        132 => "connect point",
+        134 | 136 | 138 | 146 | 148 | 418 => "finite elements",
+        140 => "offset surface",
+        150..=184 => "solid of construction",
+        190 => "plane surface",
+        192 => "cylindrical surface",
+        194 => "conical surface",
+        196 => "spherical surface",
+        198 => "toroidal surface",
+        202..=230 => "annotation",
+        302 => "definition of associations",
+        304 => "line font",
+        306 | 316 | 322 => "definition",
+        310 => "text font",
+        312 => "text display",
+        314 => "colour",
+        402 => "group or association",
+        404 => "drawing",
+        406 => "property",
+        410 => "view",
+        412 => "rectangular array of instances",
+        414 => "circular array of instances",
+        416 => "external reference",
+        320 | 420 => "network subfigure",
+        600..=699 | 10_000.. => "macro",
+        _ => return format!("{kind}"),
+    };
+    format!("{kind} ({name})")
+}

@@ -9,6 +9,7 @@ mod e2e {
     mod cases;
     mod companions;
     mod config;
+    mod curves;
     mod files;
     mod formats;
     mod heard;

@@ -27,4 +27,6 @@ pub enum HintKind {
     ManyTriangles,
     /// Walls are thinner than [`crate::Profile::thin_wall_mm`], or it was not possible to look for them.
     ThinWalls,
+    /// Colours, paint or other attributes are lost.
+    Attributes,
 }

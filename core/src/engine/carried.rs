@@ -4,6 +4,7 @@ use std::path::Path;
 
 use super::files::{self, Made};
 use crate::contract::error::{Error, Result};
+use crate::contract::hint::{Hint, HintKind};
 use crate::contract::progress::Progress;
 use crate::contract::report::{AttributesKept, Outcome, Report};
 use crate::contract::settings::{KeepAttributes, Limits, Profile};
@@ -33,6 +34,7 @@ pub(crate) fn plan<'p>(said: &'p Said<'_>, made: &'p Made) -> Option<Planned<'p>
 
 /// Does what the profile says of attributes that are lost or only about right: `harm` names them. `false`: nothing is to be written.
 pub(crate) fn heed(report: &mut Report, profile: &Profile, harm: Option<String>) -> bool {
+    report.hints.retain(|hint| hint.kind != HintKind::Attributes);
     let Some(harm) = harm else { return true };
     match profile.attributes {
         KeepAttributes::Refuse => {
@@ -43,7 +45,11 @@ pub(crate) fn heed(report: &mut Report, profile: &Profile, harm: Option<String>)
             return false;
         }
         KeepAttributes::Keep => ask_for_review(report, harm),
-        KeepAttributes::Best => {}
+        KeepAttributes::Best => {
+            let lost = report.attributes.as_ref().map_or(0, |own| own.lost);
+            let text = format!("colours, paint or other attributes of {} are lost", words::triangles(lost));
+            report.hints.extend((lost > 0).then_some(Hint { kind: HintKind::Attributes, text }));
+        }
     }
     true
 }

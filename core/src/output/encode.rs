@@ -96,9 +96,10 @@ impl Layout {
             Self::Off => plain(format!("OFF\n{vertices} {faces} 0\n")),
             Self::Obj => plain(format!("# {maker}\n# {vertices} vertices, {faces} faces\n")),
             Self::Amf(unit) => {
-                let name = escaped(if title.is_empty() { maker } else { title });
+                let title = escaped(title);
+                let title = if title.is_empty() { title } else { format!("<metadata type=\"name\">{title}</metadata>\n") };
                 let head = format!(
-                    "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<amf unit=\"{unit}\" version=\"1.2\">\n<metadata type=\"name\">{name}</metadata>\n"
+                    "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<!-- {maker} -->\n<amf unit=\"{unit}\" version=\"1.2\">\n{title}"
                 );
                 let behind = "</volume>\n</mesh>\n</object>\n";
                 Frame { head, between: "</vertices>\n<volume>\n", behind, tail: "</amf>\n".into() }
@@ -326,7 +327,7 @@ mod tests {
         let limits = Limits { threads: 2, spool: Some(folder.path().into()), ..Limits::default() };
         let mesh = Indexed::of(Path::new("a"), records, &limits, &Quiet).unwrap();
         let bodies = [Body { name: "", mesh, records: records.len() }];
-        write(&bodies, (layout, Heading { maker: "a & b", title: "" }), &output, &limits, &Quiet).unwrap();
+        write(&bodies, (layout, Heading { maker: "Maker 1", title: "a & b" }), &output, &limits, &Quiet).unwrap();
         std::fs::read(output).unwrap()
     }
 
@@ -356,7 +357,7 @@ mod tests {
         let mut model = String::new();
         let packed = &bytes[archive.entries[2].data.clone()];
         flate2::read::DeflateDecoder::new(packed).read_to_string(&mut model).unwrap();
-        assert!(model.contains("<model unit=\"inch\"") && model.contains(">a &amp; b<"), "{model}");
+        assert!(model.contains("<model unit=\"inch\"") && model.contains("\"Title\">a &amp; b<"), "{model}");
         let mesh = "<mesh>\n<vertices>\n<vertex x=\"0\" y=\"0\" z=\"0\"/>\n<vertex x=\"1.5\" y=\"0\" z=\"0\"/>\n\
             <vertex x=\"0\" y=\"1e-7\" z=\"0\"/>\n<vertex x=\"0\" y=\"0\" z=\"2e20\"/>\n</vertices>\n<triangles>\n\
             <triangle v1=\"0\" v2=\"1\" v3=\"2\"/>\n<triangle v1=\"2\" v2=\"1\" v3=\"3\"/>\n</triangles>\n</mesh>";

@@ -1,7 +1,7 @@
 //! Closed loops of curves.
 //!
 //! **In:** curves. **Out:** loops in which each curve is followed by the next, and a list of those that are in none.
-//! Components in which each end meets just one other are loops as they are; in those that branch, the faces between the curves are found ([`cells`]).
+//! Components in which each end meets just one other are loops as they are; in those that branch, the faces between the curves are found (`cells`).
 //! **Promise:** the same loops for the same curves; O(n log n) for the first kind, near O(n) for networks whose faces have few sides.
 
 mod cells;

@@ -11,6 +11,8 @@ use crate::engine::entry::repair;
 use crate::io::record::Point;
 use crate::testing::{Corners, cube, cuboid, reversed, shifted};
 
+mod rare;
+
 /// A mesh by numbers: positions, and the corners of faces.
 #[derive(Clone, Debug, Default)]
 struct Mesh {
@@ -318,62 +320,6 @@ fn untouched_rows_stay_byte_for_byte() {
     assert!(output.contains("element vertex 8\n") && result.report.outcome.is_good(), "{output}");
     let triangles = output.lines().filter(|line| line.starts_with("3 ")).count();
     assert!(output.contains(&format!("element face {}\n", 5 + output.matches("\n4 0 1 5 4\n").count() + triangles)), "{output}");
-}
-
-/// Found by fuzzing. A row that is new would have the number that faces name in vain, and give them a place in the texture that they never had.
-#[test]
-fn numbers_of_rows_that_are_not_there_stay_without_a_meaning() {
-    let mesh = Mesh::of(&crossing());
-    let whole = obj(&mesh, |k| k as u8);
-    let rows: Vec<&str> = whole.lines().filter(|line| line.starts_with("vt ")).collect();
-    for left in [0, rows.len() - 1] {
-        let lines = whole.lines().filter(|line| !rows[left..].contains(line));
-        let text: String = lines.map(|line| format!("{line}\n")).collect();
-        let result = repaired("obj", text.as_bytes(), &Profile::default());
-        let output = String::from_utf8(result.output).unwrap();
-        assert!(result.report.outcome.is_good() && result.report.attributes.is_some_and(|own| own.divided > 0));
-        assert_eq!(output.matches("\nvt ").count(), left, "{output}");
-        assert!(output.starts_with("# made by a test\nmtllib part.mtl\n") && output.matches("usemtl").count() >= 12, "{output}");
-    }
-}
-
-/// Of 128 vertices, the last one that a signed byte tells apart: where the result has more, it is the same as that of a file with wider indices.
-#[test]
-fn indices_become_wider_where_vertices_are_new() {
-    let apart = (0..14).flat_map(|k| shifted(&cube(), [0.0, 4.0 + 2.0 * k as f32, 0.0]));
-    let mesh = Mesh::of(&[crossing(), apart.collect()].concat());
-    assert_eq!(mesh.points.len(), 128);
-    let file = |form: Form, kind: &str| {
-        let wide = ply(&mesh, form, ["s", "t"], |k| k as u8);
-        if form == Form::Text {
-            return String::from_utf8(wide).unwrap().replace("uchar int vertex", &format!("uchar {kind} vertex")).into_bytes();
-        }
-        let end = wide.windows(11).position(|window| window == b"end_header\n").unwrap() + 11;
-        let head = std::str::from_utf8(&wide[..end]).unwrap().replace("uchar int vertex", &format!("uchar {kind} vertex"));
-        let faces = end + mesh.points.len() * 20;
-        let low = if form == Form::Big { 3 } else { 0 };
-        // Red, the count, three indices of four bytes, the normal.
-        let narrow = |row: &[u8]| [&row[..2], &[2, 6, 10].map(|at| row[at + low]), &row[14..]].concat();
-        [head.as_bytes(), &wide[end..faces], &wide[faces..].chunks(18).flat_map(narrow).collect::<Vec<u8>>()].concat()
-    };
-    for form in [Form::Text, Form::Little, Form::Big] {
-        let wide = repaired("ply", &ply(&mesh, form, ["s", "t"], |k| k as u8), &Profile::default());
-        for kind in ["char", "int8"] {
-            let narrow = repaired("ply", &file(form, kind), &Profile::default());
-            assert!(
-                narrow.report.attributes.is_some_and(|own| own.lost == 0 && own.kept > 150),
-                "{:?}",
-                narrow.report.attributes
-            );
-            assert_eq!(narrow.output, wide.output);
-        }
-    }
-    // Where they suffice, they stay.
-    let mut few = Mesh::of(&cube());
-    few.faces.pop();
-    let text = String::from_utf8(ply(&few, Form::Text, ["s", "t"], |_| 1)).unwrap().replace("uchar int v", "uchar char v");
-    let output = repaired("ply", text.as_bytes(), &Profile::default()).output;
-    assert!(String::from_utf8(output).unwrap().contains("uchar char vertex_indices"));
 }
 
 #[test]

@@ -21,7 +21,7 @@ pub(super) struct UnitOf {
 /// The meshes of an object, in the order of its triangles; none of an object without any.
 ///
 /// # Errors
-/// [`Error::Unreadable`] if the object's volumes are not its triangles, one volume after the other, or a triangle has no vertices.
+/// [`crate::Error::Unreadable`] if the object's volumes are not its triangles, one volume after the other, or a triangle has no vertices.
 pub(super) fn of(package: &PackageFile, place: Place, read: &MeshRecords) -> Result<Vec<UnitOf>> {
     let count = read.parsed.records.all().len();
     let refuse = |reason: &str| package.refused(place, reason);
@@ -56,7 +56,7 @@ pub(super) fn of(package: &PackageFile, place: Place, read: &MeshRecords) -> Res
 /// The triangles of a unit as an STL of their own, opened; it is there as long as the file is held. Errors and reports name it as the package.
 ///
 /// # Errors
-/// [`Error::NoSpace`], [`Error::Io`].
+/// [`crate::Error::NoSpace`], [`crate::Error::Io`].
 pub(super) fn spooled(package: &PackageFile, unit: &UnitOf, read: &MeshRecords, work: Work<'_>) -> Result<(MeshFile, Nameless)> {
     let all = &read.parsed.records;
     let records = all.all().get(unit.triangles.clone()).unwrap_or_default();

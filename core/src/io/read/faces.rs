@@ -31,6 +31,11 @@ pub(super) struct Tally {
 }
 
 impl Tally {
+    /// There are faces that give no triangle.
+    pub(super) fn has_short(&self) -> bool {
+        self.short > 0
+    }
+
     /// Joins the counts of the faces behind these.
     pub(super) fn append(&mut self, behind: Self) {
         self.first_astray = self.first_astray.or(behind.first_astray.map(|first| self.faces + first));

@@ -236,6 +236,12 @@ impl MeshFile {
         self.content.besides.doubt
     }
 
+    /// Its rows can be written anew: it has no flaw but faces of fewer than three corners, which may be left out.
+    pub(crate) fn has_whole_rows(&self) -> bool {
+        let flaws = self.content.findings.iter().filter(|finding| !finding.harmless).count();
+        flaws == usize::from(self.content.besides.short_faces)
+    }
+
     /// The name of the whole, or nothing.
     pub(crate) fn title(&self) -> &str {
         &self.content.besides.title
@@ -244,6 +250,8 @@ impl MeshFile {
     /// Triangles with colours or materials in a form that no result in another format keeps. O(n) for STL.
     pub(crate) fn coloured(&self) -> u64 {
         match self.content.format {
+            // Materialise Magics' colour of all triangles that have none of their own.
+            Format::BinaryStl if memchr::memmem::find(&self.content.header, b"COLOR=").is_some() => self.records().len() as u64,
             Format::BinaryStl => self.records().par_iter().filter(|record| record::attribute(record) != 0).count() as u64,
             _ => self.content.besides.coloured,
         }

@@ -50,13 +50,14 @@ pub(super) fn read(bytes: &[u8], context: &Context<'_>) -> Result<Parsed> {
     } else {
         tail::behind_text(whole, zeros)
     });
+    let short_faces = faces.tally().has_short();
     let (records, positions) = (faces.map()?, Some(Positions::Spooled(positions)));
     Ok(Parsed {
         records,
         findings,
         header: binary::header_of(b""),
         rounding: gathered.1,
-        besides: Besides { positions, ..Besides::default() },
+        besides: Besides { positions, short_faces, ..Besides::default() },
     })
 }
 

@@ -58,7 +58,7 @@ impl PackageFile {
         }
         let model = parallel::in_pool(limits.threads, || Model::open(&input, &context))?;
         let volumes = Volumes::of(&model, &archive, &context)?;
-        let findings = [model.findings.clone(), left_alone(&model)].concat();
+        let findings = [model.findings.clone(), left_alone(&model), no_parts(&volumes)].concat();
         Ok(Some(Self { opened, path: path.to_owned(), input, model, volumes, findings }))
     }
 
@@ -185,6 +185,18 @@ fn places(model: &Model) -> impl Iterator<Item = (Place, &Object)> {
 pub(super) fn is_repaired(object: &Object) -> bool {
     let is_printed = matches!(object.purpose, Purpose::Model | Purpose::SolidSupport);
     is_printed && matches!(&object.content, Content::Mesh(mesh) if !mesh.lattice && !mesh.triangles.inner.is_empty())
+}
+
+/// Volumes that only say where settings hold, or what is cut away.
+fn no_parts(volumes: &Volumes) -> Vec<Finding> {
+    let count = volumes.all().iter().filter(|volume| !volume.is_part).count() as u64;
+    let of = Counted(
+        count,
+        "volume of a slicer's is no part of the model, and stays as it is",
+        "volumes of a slicer's are no parts of the model, and stay as they are",
+    );
+    let text = of.to_string();
+    (count > 0).then(|| Finding { harmless: true, ..Finding::flaw(text) }).into_iter().collect()
 }
 
 /// What stays as it is.

@@ -39,6 +39,8 @@ pub(crate) struct Besides {
     pub(crate) title: String,
     /// The positions that faces name by number, where there is one table of them.
     pub(crate) positions: Option<Positions>,
+    /// Faces of fewer than three corners were left out, and a finding says so.
+    pub(crate) short_faces: bool,
     /// Triangles with colours or materials in a form that no result in another format keeps.
     pub(crate) coloured: u64,
     /// Meshes that are never welded to each other, one behind the other, all triangles in them. Of a file of one mesh that one, if it has a name; else none.

@@ -24,7 +24,10 @@ pub(super) fn read(bytes: &[u8], context: &Context<'_>) -> Result<(Parsed, Forma
     }
     let is_amf = |name: &str| name.to_ascii_lowercase().ends_with(".amf");
     let files: Vec<_> = archive.entries.iter().filter(|entry| !entry.is_folder()).collect();
-    let mut meshes = files.iter().filter(|entry| is_amf(&entry.name));
+    // What macOS and others put beside a file to say more of it has the file's name.
+    let is_beside =
+        |name: &str| name.starts_with("__MACOSX/") || name.rsplit('/').next().is_some_and(|own| own.starts_with("._"));
+    let mut meshes = files.iter().filter(|entry| is_amf(&entry.name) && !is_beside(&entry.name));
     if let (Some(entry), None) = (meshes.next(), meshes.next()) {
         let text = archive.spooled(entry, context)?;
         let mut parsed = amf::read(text.all().as_flattened(), bytes.len(), &context.passing(text.map()))?;

@@ -36,7 +36,7 @@ pub(crate) enum Said<'a> {
 impl<'a> Said<'a> {
     /// By a file that was read. O(bytes).
     pub(crate) fn by(mesh: &'a MeshFile) -> Self {
-        let (bytes, vertices) = (mesh.bytes(), mesh.vertices().filter(|_| mesh.is_flawless()));
+        let (bytes, vertices) = (mesh.bytes(), mesh.vertices().filter(|_| mesh.has_whole_rows()));
         let (rows, says_more): (Option<Box<dyn Rows + 'a>>, bool) = match mesh.format() {
             Format::Ply => (vertices.and_then(|vertices| boxed(Ply::of(bytes, vertices)?)), ply::says_more(bytes)),
             Format::Off => (vertices.and_then(|vertices| boxed(Off::of(bytes, vertices)?)), off::says_more(bytes)),

@@ -10,11 +10,58 @@ use crate::io::read::Vertices;
 use crate::io::read::elements::lines::Line;
 use crate::io::record::Point;
 
-/// The file says more than positions and faces, by its keyword.
+/// The file says more than positions and faces, by its keyword or a colour of a face. O(bytes).
 pub(crate) fn says_more(bytes: &[u8]) -> bool {
     let mut line = line_at(bytes, 0);
     let keyword = word(&mut line).and_then(|range| bytes.get(range)).unwrap_or_default();
-    keyword.strip_suffix(b"OFF").is_some_and(|letters| !letters.is_empty())
+    let letters = keyword.strip_suffix(b"OFF").unwrap_or_default();
+    !letters.is_empty() || has_coloured_faces(bytes, line).unwrap_or(false)
+}
+
+/// A face has a colour, in a file whose keyword has no letters. `line` stands behind the keyword. `None`: its rows are not where they should be.
+fn has_coloured_faces(bytes: &[u8], mut line: Line<'_>) -> Option<bool> {
+    let first = word(&mut line)?;
+    if bytes.get(first.clone())? == b"BINARY" {
+        line.skip_line();
+        let behind = bytes.get(line.at..)?;
+        let counts = line.at + behind.iter().take(2).take_while(|byte| matches!(byte, b'\r' | b'\n')).count();
+        return has_coloured_faces_in_binary(bytes, counts);
+    }
+    let count = |range: Range<usize>| std::str::from_utf8(bytes.get(range)?).ok()?.parse::<u64>().ok();
+    let (vertices, faces) = (count(first)?, count(word(&mut line)?)?);
+    line.skip_line();
+    line.end();
+    let mut at = line.at;
+    for _ in 0..vertices {
+        at = row(bytes, at)?.end;
+    }
+    for _ in 0..faces {
+        let row = row(bytes, at)?;
+        let corners = Cells::of(Form::Text, bytes.get(row.clone())?).word().and_then(number)?;
+        if count_words(bytes.get(row.clone())?) as f64 > corners + 1.0 {
+            return Some(true);
+        }
+        at = row.end;
+    }
+    Some(false)
+}
+
+/// The same in binary, of counts and indices with the highest byte first.
+fn has_coloured_faces_in_binary(bytes: &[u8], counts: usize) -> Option<bool> {
+    let count = |at: usize| {
+        let four = bytes.get(at..at.checked_add(4)?)?.first_chunk().copied()?;
+        usize::try_from(i32::from_be_bytes(four)).ok()
+    };
+    let (vertices, faces) = (count(counts)?, count(counts + 4)?);
+    let mut at = vertices.checked_mul(12)?.checked_add(counts + 12)?;
+    for _ in 0..faces {
+        at = count(at)?.checked_mul(4)?.checked_add(at + 4)?;
+        if count(at)? > 0 {
+            return Some(true);
+        }
+        at += 4;
+    }
+    Some(false)
 }
 
 /// An OFF in text.

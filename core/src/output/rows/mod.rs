@@ -20,7 +20,7 @@ use std::collections::BTreeSet;
 use std::ops::Range;
 
 use crate::contract::error::Result;
-use crate::io::rows::{CHANNELS, Rows, Source, State, Triangle, VERTICES, WHOLE};
+use crate::io::rows::{CHANNELS, FaceRow, Rows, Source, State, Triangle, VERTICES, WHOLE};
 use crate::output::model::{Account, Change};
 use made::From;
 use plan::Plan;
@@ -195,20 +195,21 @@ impl Writer<'_, '_> {
             Step::Face(..) | Step::Made => {}
             Step::Stays(own) => self.replace(&own, false),
             Step::Turned(own) => self.replace(&own, true),
-            Step::Moved(own) | Step::Gone(own) => self.leave_out(&own),
+            Step::Moved(own) | Step::Gone(own) => self.leave_out(own.row),
+            Step::Short(row) => self.leave_out(row),
         }
     }
 
-    fn leave_out(&mut self, own: &Own<'_>) {
-        if self.at < own.row.whole.end {
-            self.go_to(own.row.whole.start);
-            self.at = own.row.whole.end;
+    fn leave_out(&mut self, row: &FaceRow) {
+        if self.at < row.whole.end {
+            self.go_to(row.whole.start);
+            self.at = row.whole.end;
         }
     }
 
     /// Writes a triangle in the place of its face.
     fn replace(&mut self, own: &Own<'_>, is_turned: bool) {
-        self.leave_out(own);
+        self.leave_out(own.row);
         let source = own.source();
         let ([a, b, c], [u, v, w]) = (own.corners(), WHOLE);
         let (corners, weights) = if is_turned { ([a, c, b], [u, w, v]) } else { ([a, b, c], [u, v, w]) };

@@ -19,6 +19,8 @@ pub(super) enum Step<'r> {
     Gone(Own<'r>),
     /// A triangle that the file does not have: a part of one, or new.
     Made,
+    /// A face of fewer than three corners.
+    Short(&'r FaceRow),
 }
 
 /// A triangle of a face.
@@ -60,7 +62,7 @@ pub(super) fn walk(rows: &dyn Rows, change: &Change<'_>, mut step: impl FnMut(St
     };
     let mut fits = true;
     change.each(|fate| fits = fits && walk.take(fate, &mut step).is_some());
-    (fits && walk.at == walk.triangles.len() && walk.next_row().is_none()).then_some(())
+    (fits && walk.at == walk.triangles.len() && walk.next_row(&mut step).is_none()).then_some(())
 }
 
 struct Walk<'w> {
@@ -86,7 +88,7 @@ impl Walk<'_> {
             return Some(());
         }
         if self.at == self.triangles.len() {
-            self.next_row()?;
+            self.next_row(step)?;
         }
         let places = *self.triangles.get(self.at)?;
         self.fits(places)?;
@@ -126,14 +128,14 @@ impl Walk<'_> {
     }
 
     /// The next face that has triangles.
-    fn next_row(&mut self) -> Option<()> {
+    fn next_row(&mut self, step: &mut impl FnMut(Step<'_>)) -> Option<()> {
         self.at = 0;
         self.first = self.passed;
         loop {
             self.triangles.clear();
             self.faces.next_face(&mut self.row)?;
             match self.row.corners.len() {
-                0..3 => continue,
+                0..3 => step(Step::Short(&self.row)),
                 3 => self.triangles.push([0, 1, 2]),
                 _ => {
                     let corners: Option<Vec<Point>> =

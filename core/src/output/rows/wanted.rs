@@ -129,6 +129,7 @@ impl Wanted {
                 self.note(rows, &own, None);
             }
             Step::Made => self.result += 1,
+            Step::Short(_) => {}
         }
     }
 

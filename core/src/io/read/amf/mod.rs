@@ -105,7 +105,7 @@ pub(super) fn read(text: &[u8], bytes: usize, context: &Context<'_>) -> Result<P
     let is_coloured = document.is_coloured || notes.colours > 0;
     let coloured = if is_coloured { records.all().len() as u64 } else { 0 };
     let (unit, title, doubt) = (unit_of(&document), title(&document.name), doubt(united, notes.roles));
-    let besides = Besides { unit, title, positions: None, coloured, parts, doubt };
+    let besides = Besides { unit, title, coloured, parts, doubt, ..Besides::default() };
     Ok(Parsed { records, findings, header, rounding, besides })
 }
 

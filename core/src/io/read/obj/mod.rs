@@ -127,7 +127,13 @@ pub(super) fn read(bytes: &[u8], start: usize, context: &Context<'_>) -> Result<
     findings.extend(tally.findings());
     let (header, rounding) = (header(&found), found.rounding.if_any());
     let positions = Some(Positions::Spooled(positions));
-    Ok(Parsed { records: records.map()?, findings, header, rounding, besides: Besides { positions, ..Besides::default() } })
+    Ok(Parsed {
+        records: records.map()?,
+        findings,
+        header,
+        rounding,
+        besides: Besides { positions, short_faces: tally.has_short(), ..Besides::default() },
+    })
 }
 
 fn windows_at_a_time() -> usize {

@@ -98,6 +98,8 @@ impl<'a> Reading<'a, '_> {
         // Said once, and of the faces at any rate.
         match part.role {
             Role::None if before => {}
+            // Of two elements of one role and one count.
+            _ if self.findings.iter().any(|finding| finding.text == text) => {}
             Role::None => self.findings.push(Finding { harmless: true, ..Finding::flaw(text) }),
             _ => self.findings.push(Finding::loss(text)),
         }
@@ -205,7 +207,7 @@ impl<'a> Reading<'a, '_> {
             findings: self.findings,
             header,
             rounding,
-            besides: Besides { positions: Some(positions), ..Besides::default() },
+            besides: Besides { positions: Some(positions), short_faces: tally.has_short(), ..Besides::default() },
         })
     }
 }

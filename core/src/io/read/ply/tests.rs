@@ -90,6 +90,18 @@ fn no_mesh_is_refused_by_name() {
     }
 }
 
+/// Found by fuzzing.
+#[test]
+fn elements_of_faces_that_are_cut_off_in_the_same_way_are_told_once() {
+    let faces = "element face 9\nproperty list uchar int vertex_indices\n";
+    let text = TRIANGLE.replace("element face 1\nproperty list uchar int vertex_indices\n", &faces.repeat(3));
+    assert_ne!(text, TRIANGLE);
+    let (_, findings) = read(&text);
+    assert_eq!(findings.iter().filter(|finding| finding.starts_with("cut off")).count(), 2, "{findings:?}");
+    let (first, second) = (&findings[0], &findings[1]);
+    assert_ne!(first, second);
+}
+
 #[test]
 fn f14_counts_that_lie_take_no_memory() {
     let most = u64::MAX.to_string();

@@ -332,9 +332,9 @@ pub(crate) fn encode(
     let written = files::open(output, limits, progress)?;
     clock.stage("encode");
     confirm(made, &written, limits)?;
-    let is_named = |parts: &[Part]| parts.len() > 1 || parts.iter().any(|part| !part.name.is_empty());
-    let expected = if is_named(parts) { parts } else { &[] };
-    if matches!(layout, Layout::Amf(_)) && written.parts() != expected {
+    // Of one mesh, its name alone may make it a part.
+    let ranges = |parts: &[Part]| parts.iter().skip(1).map(|part| part.triangles.clone()).collect::<Vec<_>>();
+    if matches!(layout, Layout::Amf(_)) && ranges(written.parts()) != ranges(parts) {
         return Err(differs(&written));
     }
     Ok(written)

@@ -90,6 +90,28 @@ fn volumes_of_an_object_stay_apart() {
     assert_eq!(parts(&read(&output, folder.path())), [("lid volume 1", 12), ("lid volume 2", 12)]);
 }
 
+/// Letters of Latin-1 take two bytes in the result, and an object's name stands before that of its volume.
+#[test]
+fn names_of_any_length_are_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let beside = shifted(&cube(), [1.0, 0.0, 0.0]);
+    for (letter, length) in [("a", 1024), ("\u{e9}", 1024), ("a", 5000)] {
+        let name = letter.repeat(length);
+        for volumes in [&[&cube()[1..]][..], &[&cube()[1..], &beside]] {
+            let text = object(1, &name, volumes)
+                .replace("<volume><tri", &format!("<volume><metadata type=\"name\">{name}</metadata><tri"));
+            let input = write(folder.path(), &format!("<metadata type=\"name\">{name}</metadata>{text}"));
+            if letter != "a" {
+                let text = std::fs::read_to_string(&input).unwrap();
+                std::fs::write(&input, text.chars().map(|c| c as u8).collect::<Vec<_>>()).unwrap();
+            }
+            let (report, output) = repaired(folder.path(), &input, &Profile::default()).unwrap();
+            assert_eq!(report.outcome, Outcome::Repaired, "{:?}", report.verdict.reasons);
+            std::fs::remove_file(output).unwrap();
+        }
+    }
+}
+
 /// Names of the file, of a lone object and of volumes are those of the result; other metadata are told.
 #[test]
 fn names_stay() {

@@ -16,7 +16,7 @@ use crate::util::words::Count;
 /// Most objects, constellations, instances and meshes, together: a small archive unpacks to very many of them, and each takes some 170 bytes (measured).
 const MOST: usize = 1 << 18;
 /// Bytes of a name that are kept.
-const LONGEST_NAME: usize = 1 << 10;
+pub(super) const LONGEST_NAME: usize = 1 << 10;
 /// Bytes of an id, a unit or a type at most; what is longer counts as absent.
 const LONGEST_WORD: usize = 1 << 16;
 /// Names of objects that are kept.

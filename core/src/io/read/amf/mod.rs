@@ -36,7 +36,7 @@ use super::spool::Context;
 use crate::contract::error::Result;
 use crate::util::words::{Count, Counted};
 use constellation::Names;
-use document::Document;
+use document::{Document, LONGEST_NAME};
 use intake::Intake;
 use placed::{PartOf, Placed};
 use stretch::Notes;
@@ -132,6 +132,8 @@ fn parts(document: &Document, parts: &[PartOf]) -> Vec<Part> {
             None if volumes > 1 => format!("{own} volume {}", part.mesh + 1),
             _ => own,
         };
+        // No longer than what is read of a name, so that a result is read back as it is written.
+        let name = name.get(..name.floor_char_boundary(LONGEST_NAME)).unwrap_or_default();
         Part { name: name.trim().into(), triangles: part.triangles.clone() }
     };
     parts.iter().map(named).collect()

@@ -304,3 +304,30 @@ fn ends_in_zeros() {
         let _ = suture_core::ends_in_zeros(&std::fs::File::open(&input).unwrap());
     });
 }
+
+/// JSON of some curves with numbers of any size; IGES and STEP have fuzz targets of their own.
+fn curves() -> impl Strategy<Value = Vec<u8>> {
+    let number = prop_oneof![4 => -2.0f64..2.0, 1 => any::<f64>().prop_filter("JSON has no others", |x| x.is_finite())];
+    let point = prop::array::uniform3(number.clone());
+    let line = prop::array::uniform2(point.clone()).prop_map(|[a, b]| format!("{{\"line\": [{a:?}, {b:?}]}}"));
+    let spline = (1usize..5, prop::collection::vec(point, 0..8), prop::collection::vec(number, 0..14))
+        .prop_map(|(degree, points, knots)| format!("{{\"degree\": {degree}, \"knots\": {knots:?}, \"points\": {points:?}}}"));
+    let all = prop::collection::vec(prop_oneof![3 => line, 1 => spline], 0..8);
+    all.prop_map(|all| format!("{{\"unit\": \"mm\", \"curves\": [{}]}}", all.join(", ")).into_bytes())
+}
+
+#[test]
+fn curves_read_and_loops_find() {
+    hold(prop_oneof![file(), curves()], |bytes| {
+        let Ok(network) = suture_core::curves::read(&bytes) else { return };
+        let mut options = suture_core::curves::loops::Options::default();
+        options.closes_gaps = bytes.len().is_multiple_of(2);
+        let loops = suture_core::curves::loops::find(&network, &options);
+        assert!(loops.loops.iter().all(|own| !own.uses.is_empty()));
+        for curve in &network.curves {
+            let [low, high] = curve.shape.domain();
+            let (point, _) = curve.shape.point_and_derivative(low + (high - low) / 3.0);
+            let _ = (curve.shape.length(1e-6), curve.shape.to_spline(), curve.shape.nearest(point));
+        }
+    });
+}

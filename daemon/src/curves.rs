@@ -20,12 +20,10 @@ const PART: f64 = 1e-9;
 
 /// Says what is in each file; with 2 if one cannot be read.
 pub(crate) fn run(args: &CurvesArgs) -> Exit {
-    let options = Options {
-        tolerance: args.tolerance,
-        closes_gaps: args.close_gaps.is_some(),
-        longest_gap: args.close_gaps.unwrap_or_default(),
-        ..Options::default()
-    };
+    let mut options = Options::default();
+    options.tolerance = args.tolerance;
+    options.closes_gaps = args.close_gaps.is_some();
+    options.longest_gap = args.close_gaps.unwrap_or_default();
     let (mut text, mut exit) = (String::new(), Exit::Good);
     for path in &args.files {
         match read(path) {

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 /// Something odd about a file, or something of it that is not read.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[non_exhaustive]
 pub struct Finding {
     /// Line of the file, from 1; 0 if it is about the file as a whole.
     pub line: u64,

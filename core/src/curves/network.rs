@@ -6,6 +6,7 @@ use crate::curves::vector::{Point, is_finite};
 
 /// The unit of length of a file.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Unit {
     /// As the file calls it, or a usual name.
     pub name: String,
@@ -24,6 +25,7 @@ pub struct Use {
 
 /// A face of a file.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Face {
     /// Where it stands.
     pub source: Source,
@@ -41,6 +43,7 @@ pub struct Face {
 
 /// Curves and faces of a file.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Network {
     /// Of all coordinates.
     pub unit: Unit,
@@ -70,6 +73,7 @@ impl Network {
 
 /// Why nothing of a file is read.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum ReadError {
     /// Neither IGES nor STEP nor JSON, by its content.
     #[error("neither IGES nor STEP nor JSON; it begins with “{0}”")]

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
 use suture_store::job::{Kind, Withdrawal};
-use suture_store::{Job, JobId, Query, State, Verdict};
+use suture_store::{Job, JobId, Query, State};
 
 use super::matter::{Fate, Matter};
 use super::plan::FOLDERS;
@@ -50,6 +50,8 @@ pub(super) struct Oracle {
     pub standing: BTreeMap<Matter, BTreeSet<PathBuf>>,
     /// How often someone approved what is not good by itself.
     pub approved: BTreeMap<Key, u64>,
+    /// How often someone wanted to, and nobody knows whether the store has it: a kill came, or it was too late.
+    pub perhaps_approved: BTreeMap<Key, u64>,
     serials: u32,
     ticks: u64,
     kills: u64,
@@ -104,20 +106,30 @@ impl Oracle {
         version.matter = matter;
     }
 
+    /// An operator wants to approve this result. A kill may come before the store has it, or before anyone hears that it has.
+    pub(super) fn would_approve(&mut self, key: Key) {
+        *self.perhaps_approved.entry(key).or_default() += 1;
+    }
+
+    /// The store has it.
+    pub(super) fn has_approved(&mut self, key: Key) {
+        self.perhaps_approved.entry(key).and_modify(|count| *count -= 1);
+        *self.approved.entry(key).or_default() += 1;
+    }
+
     /// An operator's wish was granted.
     pub(super) fn wished(&mut self, job: &Job, wish: &JobsWish) {
-        let version = self
-            .versions
-            .iter()
-            .rev()
-            .find(|version| version.ino == job.source.ino && FOLDERS[version.folder] == job.source.folder);
-        match (version, wish) {
-            (Some(version), JobsWish::Retry(_)) => *self.retries.entry(version.matter.serial).or_default() += 1,
-            (Some(version), JobsWish::Decide(_, said)) if said.verdict == Verdict::Approved => {
-                *self.approved.entry((version.folder, version.matter)).or_default() += 1;
-            }
-            _ => {}
+        let mut versions = self.versions.iter().rev();
+        let version = versions.find(|version| version.ino == job.source.ino && FOLDERS[version.folder] == job.source.folder);
+        if let (Some(version), JobsWish::Retry(_)) = (version, wish) {
+            *self.retries.entry(version.matter.serial).or_default() += 1;
         }
+    }
+
+    /// So often this was approved, and at most so often.
+    pub(super) fn approvals(&self, key: &Key) -> (u64, u64) {
+        let [surely, perhaps] = [&self.approved, &self.perhaps_approved].map(|counts| counts.get(key).copied().unwrap_or(0));
+        (surely, surely + perhaps)
     }
 
     /// A worker begins: may it? Returns how often one did with this content.

@@ -5,13 +5,14 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, UNIX_EPOCH};
 
 use suture_store::job::Kind;
-use suture_store::{Clock, Decision, JobId, Priority, Query, Verdict};
+use suture_store::{Clock, Decision, Job, JobId, Priority, Query, Verdict};
 
 use super::matter::{FATES, Fate, Matter};
-use super::oracle::Version;
-use super::plan::{LEFT, Plan};
+use super::oracle::{Key, Version};
+use super::plan::{FOLDERS, LEFT, Plan};
 use super::stage::Stage;
 use crate::control::{DaemonWish, JobsWish, change, steer};
+use crate::left::result_path;
 
 /// Names that are dropped again and again.
 const NAMES: u64 = 14;
@@ -247,18 +248,28 @@ impl Stage {
         }
         let job = &jobs[self.chance(|chance| chance.index(jobs.len()))];
         let wish = wish(job.id);
-        // A kill may come when the store has it, and before anyone hears of it.
-        let decides = matches!(wish, JobsWish::Decide(..));
-        if decides {
-            self.oracle.borrow_mut().wished(job, &wish);
+        let approves = matches!(&wish, JobsWish::Decide(_, said) if said.verdict == Verdict::Approved);
+        let approved = if approves { self.judged(job) } else { None };
+        if let Some(key) = approved {
+            self.oracle.borrow_mut().would_approve(key);
         }
         // It may be too late for it.
         if change(&life.context, &wish).is_ok() {
             self.say(|| format!("{wish:?}, {}", job.source.path));
-            if !decides {
-                self.oracle.borrow_mut().wished(job, &wish);
+            let mut oracle = self.oracle.borrow_mut();
+            oracle.wished(job, &wish);
+            if let Some(key) = approved {
+                oracle.has_approved(key);
             }
         }
+    }
+
+    /// The result that a person looks at. (The original may be another one by now, and its inode another file's.)
+    fn judged(&self, job: &Job) -> Option<Key> {
+        let folder = FOLDERS.iter().position(|name| *name == job.source.folder)?;
+        let roots = [self.place.root(folder), self.place.away(folder)];
+        let best = roots.iter().filter_map(|root| std::fs::read(result_path(root, job)?).ok()).next()?;
+        Some((folder, Matter::read(&best)?.0))
     }
 
     fn take_away(&self) {

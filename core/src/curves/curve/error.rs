@@ -5,6 +5,7 @@ pub const HIGHEST_DEGREE: usize = 63;
 
 /// Why numbers are no curve.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum CurveError {
     /// A degree of 0, or one above [`HIGHEST_DEGREE`].
     #[error("degree {0} is not between 1 and {HIGHEST_DEGREE}")]

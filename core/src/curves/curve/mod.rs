@@ -23,6 +23,7 @@ pub use spline::Spline;
 
 /// The name by which a file calls a curve.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[non_exhaustive]
 pub enum Id {
     /// Number in the directory of an IGES file.
     Directory(u64),
@@ -44,6 +45,7 @@ impl std::fmt::Display for Id {
 
 /// Where something stands in a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Source {
     /// The file's name for it.
     pub id: Id,
@@ -53,6 +55,7 @@ pub struct Source {
 
 /// What a curve is for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[non_exhaustive]
 pub enum Role {
     /// Bounds nothing that the file knows.
     Free,
@@ -66,6 +69,7 @@ pub enum Role {
 
 /// A curve of a file.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Curve {
     /// What it is, in the file's unit.
     pub shape: Shape,

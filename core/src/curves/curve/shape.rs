@@ -8,6 +8,7 @@ use crate::curves::vector::{Affine, Point, add, between, distance, is_finite, sc
 
 /// What a curve is.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum Shape {
     /// From one point straight to another; parameter 0 to 1.
     Line([Point; 2]),

@@ -21,6 +21,7 @@ use edge::Edge;
 
 /// What is wanted of loops.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Options {
     /// Ends that are no farther apart are the same point, in the unit of the curves; `None`: derived from the data ([`tolerance`]).
     pub tolerance: Option<f64>,
@@ -42,6 +43,7 @@ impl Default for Options {
 
 /// A closed loop.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Loop {
     /// Its curves, each followed by the next, the last one by the first. Loops that share a curve follow it in opposite directions where the
     /// surface that they make has two sides.
@@ -52,6 +54,7 @@ pub struct Loop {
 
 /// What curves form.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub struct Loops {
     /// The distance at which ends were taken for one.
     pub tolerance: f64,

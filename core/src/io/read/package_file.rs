@@ -192,8 +192,8 @@ fn no_parts(volumes: &Volumes) -> Vec<Finding> {
     let count = volumes.all().iter().filter(|volume| !volume.is_part).count() as u64;
     let of = Counted(
         count,
-        "volume of a slicer's is no part of the model, and stays as it is",
-        "volumes of a slicer's are no parts of the model, and stay as they are",
+        "volume of a slicer's is no part of the model: it stays as it is, and is left out in another format",
+        "volumes of a slicer's are no parts of the model: they stay as they are, and are left out in another format",
     );
     let text = of.to_string();
     (count > 0).then(|| Finding { harmless: true, ..Finding::flaw(text) }).into_iter().collect()

@@ -33,6 +33,8 @@ pub(crate) struct Volume {
     pub(crate) triangles: Range<u64>,
     /// It is printed; otherwise it says where settings hold.
     pub(crate) is_part: bool,
+    /// The slicer cuts it away from the parts.
+    pub(crate) is_negative: bool,
     /// Where the numbers of the first and of the last triangle stand in the text.
     pub(crate) places: [Range<usize>; 2],
 }
@@ -183,6 +185,7 @@ pub(crate) fn volumes(name: &str, text: &[u8]) -> std::result::Result<Vec<Volume
                 b"metadata" if is_within => {
                     if let Some(last) = all.last_mut() {
                         last.is_part &= !is_modifier(&tag);
+                        last.is_negative |= value(&tag, b"value").as_deref() == Some("NegativeVolume");
                     }
                 }
                 _ => {}
@@ -221,6 +224,7 @@ fn volume(text: &str, tag: &BytesStart<'_>, [first, last]: [&str; 2], object: u3
         object,
         triangles: first..last + 1,
         is_part: true,
+        is_negative: false,
         places: [from, to],
     })
 }

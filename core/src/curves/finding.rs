@@ -1,6 +1,8 @@
-//! What is odd about a file, with the line where it stands.
+//! Oddities of a file, each with the line where it stands.
 
 use std::collections::BTreeMap;
+
+use crate::util::legible::escaped;
 
 /// Something odd about a file, or something of it that is not read.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -14,8 +16,7 @@ pub struct Finding {
 
 /// Findings that are kept of one kind; the others are counted.
 const KEPT: u64 = 20;
-/// Characters of a file's own words that are shown, at most, and of details of a finding.
-const SHOWN: usize = 80;
+/// Characters of details of a finding, at most.
 const LONGEST: usize = 400;
 
 /// Collects findings, those of the same kind up to 20, and counts what is not read by its name. Memory: O(kinds).
@@ -58,37 +59,6 @@ impl Findings {
         list.extend(unread.map(|(name, (count, line))| Finding { line, text: format!("not read: {count} × {name}") }));
         list
     }
-}
-
-/// A file's own words for people: characters that control something are escaped, and no more than 80 are shown.
-#[must_use]
-pub(crate) fn legible(words: &str) -> String {
-    escaped(words, SHOWN)
-}
-
-fn escaped(words: &str, most: usize) -> String {
-    let mut text = String::new();
-    for (count, character) in words.chars().enumerate() {
-        if count == most {
-            text.push('…');
-            break;
-        }
-        match character {
-            '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2060}'..='\u{2069}' | '\u{feff}' => {
-                text.extend(character.escape_unicode());
-            }
-            _ if character.is_control() => text.extend(character.escape_default()),
-            _ => text.push(character),
-        }
-    }
-    text
-}
-
-/// The same of bytes, which may be no UTF-8.
-#[must_use]
-pub(crate) fn legible_bytes(words: &[u8]) -> String {
-    let start = words.get(..4 * SHOWN + 4).unwrap_or(words);
-    legible(&String::from_utf8_lossy(start))
 }
 
 #[cfg(test)]

@@ -61,7 +61,7 @@ impl<'a> Place<'a> {
     fn object(&self, known: &[&str]) -> Result<&'a Map<String, Value>, ReadError> {
         let fields = self.value.as_object().ok_or_else(|| self.refused("an object is expected"))?;
         match fields.keys().find(|key| !known.contains(&key.as_str())) {
-            Some(key) => Err(self.refused(format!("“{}” is unknown", crate::curves::finding::legible(key)))),
+            Some(key) => Err(self.refused(format!("“{}” is unknown", crate::util::legible::legible(key)))),
             None => Ok(fields),
         }
     }

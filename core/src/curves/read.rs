@@ -1,8 +1,8 @@
 //! A file of curves, by its content.
 
-use super::finding::legible_bytes;
 use super::network::{Network, ReadError};
 use super::{iges, json, step};
+use crate::util::legible::legible_bytes;
 
 /// Reads a file, whatever of the three formats it is. O(length of the file).
 ///

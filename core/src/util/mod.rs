@@ -11,6 +11,7 @@ pub(crate) mod bits;
 pub(crate) mod cost;
 pub(crate) mod ids;
 pub(crate) mod lean;
+pub(crate) mod legible;
 pub(crate) mod machine;
 pub(crate) mod parallel;
 pub(crate) mod parity;

@@ -53,7 +53,7 @@ pub struct Source {
     pub line: u64,
 }
 
-/// What a curve is for.
+/// The purpose of a curve.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 #[non_exhaustive]
 pub enum Role {
@@ -71,13 +71,13 @@ pub enum Role {
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Curve {
-    /// What it is, in the file's unit.
+    /// Its shape, in the file's unit.
     pub shape: Shape,
     /// Where it stands.
     pub source: Source,
     /// The file's name for people.
     pub name: Option<String>,
-    /// What it is for.
+    /// Its purpose.
     pub role: Role,
     /// Whether the file hides it.
     pub is_blanked: bool,

@@ -1,4 +1,4 @@
-//! What a curve is, and what can be asked of it.
+//! The shape of a curve, and the questions that can be asked of it.
 
 use super::arc::Arc;
 use super::error::CurveError;
@@ -6,7 +6,7 @@ use super::length;
 use super::spline::Spline;
 use crate::curves::vector::{Affine, Point, add, between, distance, is_finite, scale, sub};
 
-/// What a curve is.
+/// The shape of a curve.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Shape {

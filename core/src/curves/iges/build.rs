@@ -12,9 +12,9 @@ use super::relations::Relations;
 use super::shapes;
 use crate::curves::collect::Collector;
 use crate::curves::curve::{Curve, Id, Role, Source};
-use crate::curves::finding::legible;
 use crate::curves::network::{Face, Network, Use};
 use crate::curves::vector::Affine;
+use crate::util::legible::legible;
 
 /// Composites and instances within each other, at most.
 pub(super) const DEEPEST: usize = 32;

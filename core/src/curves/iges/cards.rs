@@ -5,7 +5,8 @@
 
 use memchr::memchr_iter;
 
-use crate::curves::finding::{Findings, legible_bytes};
+use crate::curves::finding::Findings;
+use crate::util::legible::legible_bytes;
 
 /// A line and what is known of it.
 #[derive(Clone, Copy, Debug)]

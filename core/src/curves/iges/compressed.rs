@@ -6,7 +6,8 @@
 use super::cards::{Card, digits};
 use super::directory::{Directory, entry_of_fields};
 use super::parameters::{Delimiters, Parameters};
-use crate::curves::finding::{Findings, legible_bytes};
+use crate::curves::finding::Findings;
+use crate::util::legible::legible_bytes;
 
 /// Reads all entities of the lines behind the global section. O(length).
 pub(super) fn read(cards: &[Card<'_>], delimiters: Delimiters, directory: &mut Directory<'_>, findings: &mut Findings) {

@@ -2,8 +2,9 @@
 
 use super::cards::{Card, WIDTH};
 use super::parameters::{Delimiters, Parameters};
-use crate::curves::finding::{Findings, legible};
+use crate::curves::finding::Findings;
 use crate::curves::network::Unit;
+use crate::util::legible::legible;
 
 /// What the global section says.
 #[derive(Clone, Debug)]

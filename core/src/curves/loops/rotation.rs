@@ -103,8 +103,7 @@ fn normal(vectors: impl Iterator<Item = Point>) -> Option<Point> {
     (middle > 1e-6 * highest && lowest < 0.25 * middle).then_some(normal)
 }
 
-/// One of Jacobi's rotations: takes the entry of a row and a column away. Rows and columns are 0 to 2.
-#[allow(clippy::indexing_slicing)] // `p` and `q` are those of the three pairs above.
+/// One of Jacobi's rotations: takes the entry of a row and a column away. Rows and columns are those of the three pairs above.
 fn turn(matrix: &mut [[f64; 3]; 3], axes: &mut [Point; 3], p: usize, q: usize) {
     if matrix[p][q] == 0.0 {
         return;

@@ -31,7 +31,7 @@ const MOST_INSTANCES: u32 = 1_000_000;
 /// The number of a placement; 0 is that of nothing moved.
 pub(super) type Place = usize;
 
-/// What is read so far.
+/// The parts of a network that are read so far.
 pub(super) struct Builder<'a> {
     pub(super) index: &'a Index<'a>,
     pub(super) collector: Collector,

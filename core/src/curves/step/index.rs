@@ -6,7 +6,8 @@
 use std::collections::HashMap;
 
 use super::record::Name;
-use crate::curves::finding::{Findings, legible_bytes};
+use crate::curves::finding::Findings;
+use crate::util::legible::legible_bytes;
 
 /// An instance: its text behind `#number =`, up to its semicolon.
 #[derive(Clone, Copy, Debug)]

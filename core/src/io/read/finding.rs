@@ -2,6 +2,7 @@
 
 use super::limits::MAX_TRIANGLES;
 use crate::contract::error::Error;
+use crate::util::legible::escaped;
 use crate::util::words::Count;
 use std::path::Path;
 
@@ -38,39 +39,8 @@ impl Finding {
     }
 }
 
-/// Characters of a file's own words that are shown, at most, and those of a line that has any.
-const SHOWN: usize = 80;
+/// Characters of a line that has a file's own words, at most.
 const LONGEST_LINE: usize = 1000;
-
-/// A file's own words for people: control characters escaped, and cut to 80 characters.
-pub(super) fn legible(words: &str) -> String {
-    escaped(words, SHOWN)
-}
-
-/// Up to so many characters, of which those are escaped that control something, turn the direction of text, or are not seen at all.
-fn escaped(words: &str, most: usize) -> String {
-    let mut text = String::new();
-    for (count, character) in words.chars().enumerate() {
-        if count == most {
-            text.push('…');
-            break;
-        }
-        match character {
-            '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2060}'..='\u{2069}' | '\u{feff}' => {
-                text.extend(character.escape_unicode());
-            }
-            _ if character.is_control() => text.extend(character.escape_default()),
-            _ => text.push(character),
-        }
-    }
-    text
-}
-
-/// The same of bytes, which may be no UTF-8.
-pub(super) fn legible_bytes(words: &[u8]) -> String {
-    let start = words.get(..4 * SHOWN + 4).unwrap_or(words);
-    legible(&String::from_utf8_lossy(start))
-}
 
 /// Why a file was not read, before it is joined with the file's name.
 #[derive(Debug, PartialEq, Eq)]
@@ -105,6 +75,7 @@ impl Rejection {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::util::legible::{legible, legible_bytes};
 
     #[test]
     fn f13_whatever_a_file_says_is_shown_in_one_line() {

@@ -2,13 +2,14 @@
 
 use super::binary;
 use super::facets::{self, Tally};
-use super::finding::{Finding, Rejection, legible_bytes};
+use super::finding::{Finding, Rejection};
 use super::limits::{HEADER_BYTES, window};
 use super::number::{COMMA, POINT};
 use super::parsed::{Besides, Parsed};
 use super::spool::Context;
 use crate::contract::error::Result;
 use crate::io::record::Record;
+use crate::util::legible::legible_bytes;
 use crate::util::words::{Count, Counted};
 
 /// Text parsed at a time by one thread.

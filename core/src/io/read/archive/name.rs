@@ -2,7 +2,8 @@
 
 use std::collections::HashMap;
 
-use super::super::finding::{Rejection, legible};
+use super::super::finding::Rejection;
+use crate::util::legible::legible;
 
 /// Bytes of a name, at most.
 const LONGEST: usize = 1024;

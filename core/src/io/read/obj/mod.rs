@@ -17,7 +17,7 @@ mod tests;
 
 use super::binary;
 use super::faces::Tally;
-use super::finding::{Finding, Rejection, legible_bytes};
+use super::finding::{Finding, Rejection};
 use super::foreign;
 use super::limits::window;
 use super::number::{COMMA, POINT};
@@ -26,6 +26,7 @@ use super::spool::{Context, POSITION_BYTES};
 use super::vertices::{Positions, Vertices};
 use crate::contract::error::Result;
 use crate::io::record::Record;
+use crate::util::legible::legible_bytes;
 use crate::util::words::{Count, Counted};
 use line::{Cursor, next_line};
 use surfaces::Surfaces;

@@ -1,8 +1,8 @@
 //! Namespaces of 3MF, and which of them are understood.
 
 use super::super::archive::shown;
-use super::super::finding::legible;
 use super::super::xml::Element;
+use crate::util::legible::legible;
 
 const CORE: &str = "http://schemas.microsoft.com/3dmanufacturing/core/2015/02";
 /// The namespace of the draft 0.93, whose meshes, components and builds are the same.

@@ -185,7 +185,7 @@ pub(crate) fn volumes(name: &str, text: &[u8]) -> std::result::Result<Vec<Volume
                 b"metadata" if is_within => {
                     if let Some(last) = all.last_mut() {
                         last.is_part &= !is_modifier(&tag);
-                        last.is_negative |= value(&tag, b"value").as_deref() == Some("NegativeVolume");
+                        last.is_negative |= is_negative(&tag);
                     }
                 }
                 _ => {}
@@ -207,6 +207,10 @@ fn is_modifier(tag: &BytesStart<'_>) -> bool {
         (Some("modifier"), Some(is)) => is == "1",
         _ => false,
     }
+}
+
+fn is_negative(tag: &BytesStart<'_>) -> bool {
+    value(tag, b"key").as_deref() == Some("volume_type") && value(tag, b"value").as_deref() == Some("NegativeVolume")
 }
 
 fn volume(text: &str, tag: &BytesStart<'_>, [first, last]: [&str; 2], object: u32) -> Option<Volume> {

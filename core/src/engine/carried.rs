@@ -1,6 +1,9 @@
 //! What a file says besides positions and faces, on its way into the result.
 
+use std::collections::BTreeSet;
 use std::path::Path;
+
+use rayon::prelude::*;
 
 use super::files::{self, Made};
 use crate::contract::error::{Error, Result};
@@ -10,6 +13,7 @@ use crate::contract::report::{AttributesKept, Outcome, Report};
 use crate::contract::settings::{KeepAttributes, Limits, Profile};
 use crate::geometry::position;
 use crate::io::read::MeshFile;
+use crate::io::record;
 use crate::io::rows::Said;
 use crate::io::write_behind::WriteBehind;
 use crate::output::emit;
@@ -24,6 +28,25 @@ pub(crate) fn account(said: &Said<'_>, planned: Option<&Planned<'_>>, triangles:
         (_, Some(planned)) => Some(planned.account),
         (said, None) => Some(Account { lost: said.triangles(triangles), ..Account::default() }),
     }
+}
+
+/// The fate of the attribute words of an STL that is an STL again, where one of them is touched or the profile asks. O(edit), and O(n) then.
+pub(crate) fn words_account(made: &Made, profile: &Profile) -> Option<Account> {
+    let records = made.mesh.records();
+    let has_word = |t: u32| records.get(t as usize).is_some_and(|record| record::attribute(record) != 0);
+    let parents: BTreeSet<u32> = made.edit.added_with_origins().filter_map(|(_, from)| from.input_face()).collect();
+    let mut account = Account::default();
+    for (_, from) in made.edit.added_with_origins().filter(|(record, _)| record::attribute(record) != 0) {
+        *(if from.input_face().is_some() { &mut account.divided } else { &mut account.inherited }) += 1;
+    }
+    let gone: Vec<u32> = made.edit.deleted_records().filter(|t| has_word(*t)).collect();
+    account.lost = gone.iter().filter(|t| !parents.contains(t)).count() as u64;
+    if account == Account::default() && profile.attributes == KeepAttributes::Best {
+        return None;
+    }
+    let words = records.par_iter().filter(|record| record::attribute(record) != 0).count() as u64;
+    account.kept = words - gone.len() as u64;
+    (account != Account::default()).then_some(account)
 }
 
 /// How the file is written in its own rows, where it can be.

@@ -268,7 +268,7 @@ pub(crate) fn expectation<'e>(
     irregular_triangles: u64,
     limits: &Limits,
 ) -> Option<Expectation<'e>> {
-    let (gone, added) = (edit.gone(), edit.added().len() as u64);
+    let (gone, added) = (edit.gone(), edit.added_with_origins().count() as u64);
     let is_worthwhile = incremental::is_worthwhile(gone, added, records.len())
         && incremental::bytes(irregular_triangles, gone + added) <= limits.memory_bytes;
     is_worthwhile.then(|| Expectation::of(records, edit))

@@ -90,24 +90,35 @@ fn layout_of(format: Format, unit: Option<&'static str>) -> Option<Layout> {
     }
 }
 
-/// Makes `mesh` the new STL `output`, in which there is no place for what its file says besides positions and faces.
+/// Makes `mesh` the new STL `output`, in which attribute words of an STL have a place, and nothing else that a file says besides positions and faces.
 ///
 /// # Errors
 /// [`Error`], any of them.
 pub(crate) fn into_stl(mesh: MeshFile, output: &Path, target: Target, work: Work<'_>, clock: &mut Clock) -> Result<Report> {
     let Work { profile, limits, progress } = work;
-    let lost = if target.is_input { 0 } else { Said::by(&mesh).triangles(mesh.records().len()) };
+    let says = if target.is_input { None } else { Some(Said::by(&mesh).triangles(mesh.records().len())) };
     // A result that the profile refuses is never at its place.
-    let nameless = if lost > 0 && profile.attributes == KeepAttributes::Refuse { Some(Nameless::new(limits)?) } else { None };
-    let place = nameless.as_ref().map(Nameless::path);
-    let output = place.as_deref().unwrap_or(output);
+    let is_at_risk = profile.attributes == KeepAttributes::Refuse && says.unwrap_or_else(|| mesh.coloured()) > 0;
+    let nameless = if is_at_risk { Some(Nameless::new(limits)?) } else { None };
+    let spool = nameless.as_ref().map(Nameless::path);
     let doubt = mesh.doubt();
-    let mut report = files::make(mesh, output, target.is_input, (profile, limits), progress, clock)?.report;
+    let made = files::make(mesh, spool.as_deref().unwrap_or(output), target.is_input, (profile, limits), progress, clock)?;
+    let mut report = made.report.clone();
     carried::ask_if_doubtful(&mut report, doubt);
-    if lost > 0 && report.output.is_some() {
-        let account = Account { lost, ..Account::default() };
-        report.attributes = Some(account.told());
-        carried::heed(&mut report, profile, carried::harm(account));
+    if report.output.is_none() {
+        return Ok(report);
+    }
+    let account = match says {
+        None => carried::words_account(&made, profile),
+        Some(lost) => (lost > 0).then(|| Account { lost, ..Account::default() }),
+    };
+    report.attributes = account.map(Account::told);
+    if !carried::heed(&mut report, profile, account.and_then(carried::harm)) {
+        return Ok(report);
+    }
+    if let Some(spool) = spool {
+        let written = copy(&spool, output, limits, progress)?;
+        report.output = Some(files::facts(&written, files::hash(&written, limits, progress)));
     }
     Ok(report)
 }
@@ -233,7 +244,11 @@ pub(crate) fn convert(
     mesh.check_unchanged()?;
     let facts = |mesh: &MeshFile| files::facts(mesh, files::hash(mesh, limits, progress));
     let attributes_lost = if target.is_input { 0 } else { Said::by(&mesh).triangles(mesh.records().len()) };
-    Ok(Converted { input: facts(&mesh), output: facts(&written), attributes_lost })
+    let mut facts_of_input = facts(&mesh);
+    if !target.is_input {
+        facts_of_input.findings.extend_from_slice(mesh.left_out());
+    }
+    Ok(Converted { input: facts_of_input, output: facts(&written), attributes_lost })
 }
 
 /// AMF has no centimetre (ISO/ASTM 52915:2020, section 5.2): its readers would take other lengths.

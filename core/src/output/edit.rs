@@ -131,9 +131,9 @@ impl Edit {
         &NONE
     }
 
-    /// New records, in order.
-    pub(crate) fn added(&self) -> &[Record] {
-        &self.added
+    /// New records with the faces that they come from, in order.
+    pub(crate) fn added_with_origins(&self) -> impl Iterator<Item = (&Record, FaceOrigin)> {
+        self.added.iter().zip(self.added_from.iter().copied())
     }
 
     /// All records that are new, moved ones included and turned ones not, in no order that matters.
@@ -179,6 +179,11 @@ impl Edit {
     /// The numbers of all records that are no more what they were, each once.
     pub(crate) fn gone_records(&self) -> impl Iterator<Item = u32> {
         self.changes.iter().map(|(t, _)| *t).chain(ones(&self.flipped)).chain(ones(&self.dropped))
+    }
+
+    /// The numbers of the records that are left out, each once.
+    pub(crate) fn deleted_records(&self) -> impl Iterator<Item = u32> {
+        self.changes.iter().filter(|change| change.1 == Change::Delete).map(|(t, _)| *t).chain(ones(&self.dropped))
     }
 
     /// Records in the output.

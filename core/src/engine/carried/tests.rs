@@ -12,6 +12,7 @@ use crate::io::record::Point;
 use crate::testing::{Corners, cube, cuboid, reversed, shifted};
 
 mod rare;
+mod stl;
 
 /// A mesh by numbers: positions, and the corners of faces.
 #[derive(Clone, Debug, Default)]
@@ -418,7 +419,7 @@ proptest! {
         }
         triangles.extend(shifted(&cube(), [by, 0.1, 0.2]));
         let mesh = Mesh::of(&triangles);
-        let old: std::collections::BTreeSet<[u32; 3]> = mesh.points.iter().map(|point| point.map(f32::to_bits)).collect();
+        let old: BTreeSet<[u32; 3]> = mesh.points.iter().map(|point| point.map(f32::to_bits)).collect();
         let check = |points: &[Point], values: &[[f32; 2]]| {
             for (point, value) in points.iter().zip(values) {
                 if old.contains(&point.map(f32::to_bits)) {

@@ -83,7 +83,7 @@ pub(crate) fn repair_as(package: &PackageFile, output: &Path, work: Work<'_>, cl
         clock.stage("encode");
         report.output = Some(converted.output);
         judge_built(&mut report, output, work, clock)?;
-        if package.volumes().all().iter().any(|volume| volume.is_negative) {
+        if package.has_negative() {
             let reason = "negative volumes of a slicer's project are left out: what they cut away is solid in the result";
             carried::ask_for_review(&mut report, reason.into());
         }

@@ -52,9 +52,14 @@ fn package(objects: &[String], others: &[Member]) -> Vec<u8> {
 }
 
 fn package_in(unit: &str, objects: &[String], others: &[Member]) -> Vec<u8> {
-    let items: String = (1..=objects.len()).map(|id| format!("<item objectid=\"{id}\"/>")).collect();
+    package_building(&(1..=objects.len()).collect::<Vec<_>>(), unit, objects, others)
+}
+
+/// A package that builds the objects of these numbers.
+fn package_building(built: &[usize], unit: &str, objects: &[String], others: &[Member]) -> Vec<u8> {
+    let items: String = built.iter().map(|id| format!("<item objectid=\"{id}\"/>")).collect();
     let model = format!(
-        "<?xml version=\"1.0\"?>\n<model unit=\"{unit}\" xmlns=\"{CORE}\" xmlns:slic3rpe=\"{PRUSA}\"><resources>{}</resources><build>{items}</build></model>",
+        "<?xml version=\"1.0\"?>\n<model unit=\"{unit}\" xmlns=\"{CORE}\" xmlns:slic3rpe=\"{PRUSA}\"><metadata name=\"Title\">A vase</metadata><resources>{}</resources><build>{items}</build></model>",
         objects.concat()
     );
     let relationships = "<Relationships xmlns='http://schemas.openxmlformats.org/package/2006/relationships'>\
@@ -345,6 +350,54 @@ fn volumes_in_a_mesh_are_meshes_of_their_own() {
         let expected = if modifier == 0 { (Outcome::NotGood, Some(24)) } else { (Outcome::Repaired, Some(12)) };
         assert_eq!((other.report.outcome, other.report.output.map(|output| output.triangles)), expected);
     }
+}
+
+/// Bambu Studio and OrcaSlicer say beside the model which components are cut away.
+#[test]
+fn objects_that_a_project_cuts_away_are_no_parts() {
+    let far: String = (0..8).map(corner).map(|[x, y, z]| format!("<vertex x=\"{}\" y=\"{y}\" z=\"{z}\"/>", x + 50)).collect();
+    let holes = triangles(&BOX[..11], |_| String::new());
+    let of = |id: u32| {
+        format!("<object id=\"{id}\"><components><component objectid=\"1\"/><component objectid=\"2\"/></components></object>")
+    };
+    let objects = [object(1, &vertices(), &holes), object(2, &far, &holes), of(3), of(4)];
+    let role = |id: u32, role: &str| {
+        format!(
+            "<object id=\"{id}\"><part id=\"1\" subtype=\"normal_part\"/><part id=\"2\" subtype=\"{role}\"><mesh_stat/></part></object>"
+        )
+    };
+    let config = format!("<config>{}{}</config>", role(3, "negative_part"), role(4, "normal_part"));
+    let others = [member("Metadata/model_settings.config", config)];
+    let package = |built: &[usize]| package_building(built, "millimeter", &objects, &others);
+
+    let own = Repaired::of(&package(&[3]), &Profile::default());
+    assert_eq!((own.report.outcome, own.report.objects.len()), (Outcome::Repaired, 1), "{:?}", own.report.verdict);
+    assert!(own.text().contains(&objects[1]), "what is cut away stays as it is");
+    let stl = Profile { format: OutputFormat::Stl, ..Profile::default() };
+    let other = Repaired::of(&package(&[3]), &stl).report;
+    assert_eq!((other.outcome, other.output.map(|output| output.triangles)), (Outcome::NeedsReview, Some(12)));
+    // The same mesh is material in another object.
+    let both = Repaired::of(&package(&[4]), &Profile::default());
+    assert_eq!((both.report.outcome, both.report.objects.len()), (Outcome::Repaired, 2), "{:?}", both.report.verdict);
+    let other = Repaired::of(&package(&[4]), &stl).report;
+    assert_eq!((other.outcome, other.output.map(|output| output.triangles)), (Outcome::Repaired, Some(24)));
+}
+
+#[test]
+fn a_conversion_tells_of_objects_that_are_left_out_and_keeps_the_title() {
+    let folder = tempfile::tempdir().unwrap();
+    let [input, amf, copy] = ["in.3mf", "out.amf", "copy.3mf"].map(|name| folder.path().join(name));
+    let whole = |id| object(id, &vertices(), &triangles(&BOX, |_| String::new()));
+    let support = whole(2).replace("type=\"model\"", "type=\"support\"");
+    std::fs::write(&input, package(&[whole(1), support], &[])).unwrap();
+    let limits = Limits { threads: 2, ..Limits::default() };
+    let made = |output: &Path, format| crate::convert(&input, output, format, &limits, &Quiet).unwrap();
+    let converted = made(&amf, OutputFormat::Amf);
+    let expected = ["1 object of the build that is support, surface or no mesh of triangles, left out"];
+    assert_eq!((converted.input.findings.as_slice(), converted.output.triangles), (&expected.map(String::from)[..], 12));
+    assert!(std::fs::read_to_string(&amf).unwrap().contains("A vase"));
+    // A copy has all of it.
+    assert_eq!(made(&copy, OutputFormat::ThreeMf).input.findings, [""; 0]);
 }
 
 #[test]

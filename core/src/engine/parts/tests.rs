@@ -220,6 +220,8 @@ fn volumes_with_a_role_of_a_slicer_need_review() {
         assert_eq!(report.outcome, outcome, "{:?}", report.verdict.reasons);
         std::fs::remove_file(output).unwrap();
     }
+    let support = write(folder.path(), &touching().replacen("<volume>", "<volume type=\"support\">", 1));
+    assert_eq!(repaired(folder.path(), &support, &Profile::default()).unwrap().0.outcome, Outcome::NeedsReview);
 }
 
 #[test]

@@ -13,6 +13,7 @@ use super::limits::most_copies;
 use super::parsed::{Besides, Parsed};
 use super::rounding::Rounding;
 use super::spool::{Context, Items, Spool};
+use super::threemf::roles::Role;
 use super::threemf::slicer::Volume;
 use super::threemf::{MeshRecords, Model, Object, Place, Transform};
 use crate::contract::error::Result;
@@ -76,10 +77,16 @@ pub(super) fn mesh(
     let coloured = reading.coloured;
     Ok(Parsed {
         records: spool.map()?,
-        findings: [model.findings.clone(), reading.findings(), left_out(volumes)].concat(),
+        findings: [model.findings.clone(), reading.findings()].concat(),
         header: binary::header_of(b""),
         rounding: rounding.if_any(),
-        besides: Besides { unit: Some(model.unit().name()), coloured, ..Besides::default() },
+        besides: Besides {
+            unit: Some(model.unit().name()),
+            title: model.title(),
+            coloured,
+            left_out: left_out(model, volumes, wanted),
+            ..Besides::default()
+        },
     })
 }
 
@@ -96,24 +103,33 @@ fn parts(model: &Model, volumes: &[Volume], place: Place, triangles: usize) -> V
     own().filter(|volume| volume.is_part).map(|volume| volume.triangles.start as usize..volume.triangles.end as usize).collect()
 }
 
-/// Tells of volumes that only say where settings hold, or what is cut away.
-fn left_out(volumes: &[Volume]) -> Vec<Finding> {
-    let count = volumes.iter().filter(|volume| !volume.is_part).count() as u64;
+/// Tells of volumes that only say where settings hold, or what is cut away, and of objects that are not wanted.
+fn left_out(model: &Model, volumes: &[Volume], wanted: fn(&Object) -> bool) -> Vec<String> {
+    let count = volumes.iter().filter(|volume| !volume.is_part).count() as u64 + model.no_parts().uses;
     let of = Counted(
         count,
         "volume of a slicer's that is no part of the model, left out",
         "volumes of a slicer's that are no parts of the model, left out",
     );
-    let text = of.to_string();
-    (count > 0).then(|| Finding { harmless: true, ..Finding::flaw(text) }).into_iter().collect()
+    let mut others = 0;
+    for item in model.items() {
+        let is_other = |place, role| role == Role::Part && model.object(place).is_some_and(|object| !wanted(object));
+        model.instances(item, |place, _, role| others += u64::from(is_other(place, role)));
+    }
+    let objects = Counted(
+        others,
+        "object of the build that is support, surface or no mesh of triangles, left out",
+        "objects of the build that are support, surface or no meshes of triangles, left out",
+    );
+    [(count, of), (others, objects)].into_iter().filter(|(count, _)| *count > 0).map(|(_, words)| words.to_string()).collect()
 }
 
 /// Calls `place` for each object that is wanted, where it is built, until it fails.
 fn each(model: &Model, wanted: fn(&Object) -> bool, mut place: impl FnMut(Place, &Transform) -> Result<()>) -> Result<()> {
     let mut done = Ok(());
     for item in model.items() {
-        model.instances(item, |at, transform| {
-            if done.is_ok() && model.object(at).is_some_and(wanted) {
+        model.instances(item, |at, transform, role| {
+            if done.is_ok() && role == Role::Part && model.object(at).is_some_and(wanted) {
                 done = place(at, transform);
             }
         });

@@ -236,6 +236,11 @@ impl MeshFile {
         self.content.besides.doubt
     }
 
+    /// What the file builds and another format has no place for, in words.
+    pub(crate) fn left_out(&self) -> &[String] {
+        &self.content.besides.left_out
+    }
+
     /// Its rows can be written anew: it has no flaw but faces of fewer than three corners, which may be left out.
     pub(crate) fn has_whole_rows(&self) -> bool {
         let flaws = self.content.findings.iter().filter(|finding| !finding.harmless).count();

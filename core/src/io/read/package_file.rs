@@ -8,6 +8,7 @@ use super::archive::Archive;
 use super::finding::{Finding, Rejection};
 use super::opened::Opened;
 use super::spool::Context;
+use super::threemf::roles::NoParts;
 use super::threemf::slicer::{Volume, Volumes};
 use super::threemf::{Content, MeshRecords, Model, Object, Place, Purpose};
 use crate::contract::error::{Error, Result};
@@ -27,6 +28,8 @@ pub(crate) struct PackageFile {
     model: Model,
     /// Stretches of triangles that are bodies of their own to a slicer.
     volumes: Volumes,
+    /// Objects that are no parts of the model to a slicer.
+    no_parts: NoParts,
     findings: Vec<Finding>,
 }
 
@@ -58,13 +61,15 @@ impl PackageFile {
         }
         let model = parallel::in_pool(limits.threads, || Model::open(&input, &context))?;
         let volumes = Volumes::of(&model, &archive, &context)?;
-        let findings = [model.findings.clone(), left_alone(&model), no_parts(&volumes)].concat();
-        Ok(Some(Self { opened, path: path.to_owned(), input, model, volumes, findings }))
+        let no_parts = model.no_parts();
+        let findings = [model.findings.clone(), left_alone(&model), told(&volumes, &no_parts)].concat();
+        Ok(Some(Self { opened, path: path.to_owned(), input, model, volumes, no_parts, findings }))
     }
 
     /// The objects that are repaired: meshes of triangles that are printed, in the order of the parts and of their texts.
     pub(crate) fn meshes(&self) -> Vec<Place> {
-        places(&self.model).filter(|(_, object)| is_repaired(object)).map(|(place, _)| place).collect()
+        let is_repaired = |(place, object): &(Place, &Object)| is_repaired(object) && !self.no_parts.objects.contains(place);
+        places(&self.model).filter(is_repaired).map(|(place, _)| place).collect()
     }
 
     /// Reads an object's mesh. O(text).
@@ -125,6 +130,11 @@ impl PackageFile {
     /// All volumes of the slicer's.
     pub(crate) fn volumes(&self) -> &Volumes {
         &self.volumes
+    }
+
+    /// A slicer cuts something of it away from something else.
+    pub(crate) fn has_negative(&self) -> bool {
+        self.no_parts.any_negative || self.volumes.all().iter().any(|volume| volume.is_negative)
     }
 
     /// The numbers of an object's volumes.
@@ -188,8 +198,8 @@ pub(super) fn is_repaired(object: &Object) -> bool {
 }
 
 /// Volumes that only say where settings hold, or what is cut away.
-fn no_parts(volumes: &Volumes) -> Vec<Finding> {
-    let count = volumes.all().iter().filter(|volume| !volume.is_part).count() as u64;
+fn told(volumes: &Volumes, objects: &NoParts) -> Vec<Finding> {
+    let count = volumes.all().iter().filter(|volume| !volume.is_part).count() as u64 + objects.objects.len() as u64;
     let of = Counted(
         count,
         "volume of a slicer's is no part of the model: it stays as it is, and is left out in another format",

@@ -45,6 +45,8 @@ pub(crate) struct Besides {
     pub(crate) coloured: u64,
     /// Meshes that are never welded to each other, one behind the other, all triangles in them. Of a file of one mesh that one, if it has a name; else none.
     pub(crate) parts: Vec<Part>,
+    /// What the file builds and another format has no place for, in words.
+    pub(crate) left_out: Vec<String>,
     /// A person should look at a result that is no copy, for this reason.
     pub(crate) doubt: Option<&'static str>,
 }

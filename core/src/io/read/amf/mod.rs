@@ -104,7 +104,7 @@ pub(super) fn read(text: &[u8], bytes: usize, context: &Context<'_>) -> Result<P
     // Colours of the file, of objects, volumes, vertices and triangles count for one another: nobody knows whose they are.
     let is_coloured = document.is_coloured || notes.colours > 0;
     let coloured = if is_coloured { records.all().len() as u64 } else { 0 };
-    let (unit, title, doubt) = (unit_of(&document), title(&document.name), doubt(united, notes.roles));
+    let (unit, title, doubt) = (unit_of(&document), title(&document.name), doubt(united, notes.roles + document.supports));
     let besides = Besides { unit, title, coloured, parts, doubt, ..Besides::default() };
     Ok(Parsed { records, findings, header, rounding, besides })
 }
@@ -112,9 +112,7 @@ pub(super) fn read(text: &[u8], bytes: usize, context: &Context<'_>) -> Result<P
 /// Why somebody should look at a repair of such a file.
 fn doubt(united: bool, roles: u64) -> Option<&'static str> {
     match (united, roles) {
-        (_, 1..) => Some(
-            "modifiers, negative volumes or supports of a slicer become parts of the model: no result in AMF keeps their roles",
-        ),
+        (_, 1..) => Some("modifiers, negative volumes or supports become parts of the model: no result keeps their roles"),
         (true, 0) => Some("its objects could not be repaired one by one: two that touch may be one body now"),
         (false, 0) => None,
     }

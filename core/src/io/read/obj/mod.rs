@@ -243,7 +243,7 @@ fn findings(bytes: &[u8], found: &Survey, cut_off: bool) -> Vec<Finding> {
         )
     });
     note(found.weighted > 0, true, &|| format!("weights of {}, which faces have no use for", vertices_word(found.weighted)));
-    note(found.lines + found.points > 0, true, &|| format!("{}, which are no surface, left out", lines_and_points(found)));
+    note(found.lines + found.points > 0, true, &|| format!("{}, which are no part of the mesh", lines_and_points(found)));
     note(found.curves > 0, false, &|| {
         format!("{} in free form, left out", Counted(found.curves, "curve or surface", "curves and surfaces"))
     });

@@ -70,7 +70,7 @@ fn what_is_no_face_is_told() {
         [
             "1 vertex with a coordinate that is missing or no number, read as NaN; the first at byte 147",
             "weights of 1 vertex, which faces have no use for",
-            "1 line and 2 points, which are no surface, left out",
+            "1 line and 2 points, which are no part of the mesh",
             "1 curve or surface in free form, left out",
             "1 statement unknown to OBJ, passed over; the first is \"mystery\"",
             "2 objects (a, b), read as one mesh",

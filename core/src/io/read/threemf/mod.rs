@@ -22,6 +22,7 @@ mod model;
 mod object;
 mod open;
 mod outline;
+pub(crate) mod roles;
 mod scan;
 mod shards;
 pub(crate) mod slicer;

@@ -7,6 +7,7 @@ use super::super::archive::Entry;
 use super::super::finding::Finding;
 use super::super::spool::Items;
 use super::super::xml::Scopes;
+use super::roles::Roles;
 use super::transform::Transform;
 
 /// The unit of all coordinates of a part (3MF Core 3.3).
@@ -158,12 +159,21 @@ pub(crate) struct Model {
     /// There are digital signatures, which no changed package keeps.
     pub(crate) signed: bool,
     pub(crate) findings: Vec<Finding>,
+    /// The uses of objects, as far as a slicer's project names them.
+    pub(super) roles: Roles,
 }
 
 impl Model {
     /// What is to be built, in order.
     pub(crate) fn items(&self) -> &[Item] {
         self.parts.first().map_or(&[], |part| part.items.as_slice())
+    }
+
+    /// The title of the whole in its metadata (3MF Core 1.3, section 3.4.1), or nothing; without control characters.
+    pub(crate) fn title(&self) -> String {
+        let all = self.parts.first().map_or(&[][..], |part| &part.metadata);
+        let title = all.iter().find(|(name, _)| name == "Title").map_or("", |(_, value)| value.trim());
+        title.chars().map(|c| if c.is_control() { ' ' } else { c }).collect()
     }
 
     /// The unit of the whole.

@@ -9,6 +9,7 @@ use super::super::spool::Context;
 use super::budget::Budget;
 use super::model::{Content, Model, Part};
 use super::outline;
+use super::roles::Roles;
 use crate::contract::error::Result;
 use crate::util::words::Counted;
 
@@ -20,6 +21,7 @@ impl Model {
     pub(crate) fn open(bytes: &[u8], context: &Context<'_>) -> Result<Self> {
         let reject = |rejection: Rejection| rejection.at(context.path);
         let archive = Archive::open(bytes).map_err(reject)?;
+        let roles = Roles::read(&archive, context)?;
         let package = Opc::open(archive, context)?;
         let (mut parts, mut budget, mut by_name) = (Vec::new(), Budget::of(bytes.len()), HashMap::new());
         let start = package.start.clone();
@@ -41,7 +43,7 @@ impl Model {
             parts.push(part);
         }
         let entries = package.entries().to_vec();
-        let mut model = Self { entries, parts, by_name, signed: package.signed, findings: package.findings };
+        let mut model = Self { entries, parts, by_name, signed: package.signed, findings: package.findings, roles };
         if model.parts.iter().any(|part| part.draft) {
             model.findings.push(Finding::flaw("a model of the draft 0.93 of 3MF"));
         }

@@ -76,7 +76,7 @@ fn an_outline_has_all_that_a_model_says() {
         assert_eq!(model.records(FIRST, context)?.parsed.records.all().len(), 4);
         assert!(!model.items()[0].printable);
         let mut places = Vec::new();
-        model.instances(&model.items()[0], |place, transform| places.push((place, *transform)));
+        model.instances(&model.items()[0], |place, transform, _| places.push((place, *transform)));
         Ok(places)
     });
     let moved = |text| Transform::parse(text).unwrap();
@@ -292,7 +292,7 @@ proptest! {
         let instances = seen(&package(start, &[("3D/o.model", &other)]), |model, context| {
             let mut count = 0;
             for item in model.items() {
-                model.instances(item, |place, _| count += u32::from(model.records(place, context).is_ok()));
+                model.instances(item, |place, _, _| count += u32::from(model.records(place, context).is_ok()));
             }
             Ok(count)
         });

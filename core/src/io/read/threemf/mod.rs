@@ -19,6 +19,7 @@ mod expand;
 mod extensions;
 mod mesh;
 mod model;
+mod no_parts;
 mod object;
 mod open;
 mod outline;
@@ -32,4 +33,5 @@ mod transform;
 
 pub(crate) use mesh::MeshRecords;
 pub(crate) use model::{Content, Model, Object, Place, Purpose};
+pub(crate) use no_parts::NoParts;
 pub(crate) use transform::Transform;

@@ -4,7 +4,7 @@
 //! the number of the object that the component places (Bambu Studio's `src/libslic3r/Format/bbs_3mf.cpp`, `_add_model_config_file_to_archive`; the names of
 //! the types are in `ModelVolume::type_to_string`). One mesh may be a part of one object and be cut away from another.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::HashMap;
 
 use quick_xml::Reader;
 use quick_xml::events::{BytesStart, Event};
@@ -12,7 +12,6 @@ use quick_xml::events::{BytesStart, Event};
 use super::super::archive::{Archive, shown};
 use super::super::finding::Rejection;
 use super::super::spool::Context;
-use super::{Model, Place};
 use crate::contract::error::Result;
 
 const CONFIG: &str = "Metadata/model_settings.config";
@@ -90,6 +89,11 @@ impl Roles {
         Ok(Self { named })
     }
 
+    /// Nothing in the package is anything but a part.
+    pub(super) fn are_all_parts(&self) -> bool {
+        self.named.is_empty()
+    }
+
     /// The role of the component that is the `nth` of those in `object` that place the object `part`, counted from 0.
     pub(super) fn of(&self, object: u32, part: u32, nth: usize) -> Role {
         let Some(roles) = self.named.get(&(object, part)) else { return Role::Part };
@@ -100,40 +104,6 @@ impl Roles {
 fn number(tag: &BytesStart<'_>) -> Option<u32> {
     let attribute = tag.try_get_attribute("id").ok()??;
     std::str::from_utf8(&attribute.value).ok()?.trim().parse().ok()
-}
-
-/// What of a build is no part of it.
-#[derive(Debug, Default)]
-pub(crate) struct NoParts {
-    /// Objects that are built, and are a part nowhere.
-    pub(crate) objects: HashSet<Place>,
-    /// Places where an object is built that is no part there.
-    pub(crate) uses: u64,
-    /// Some of it is cut away from parts.
-    pub(crate) any_negative: bool,
-}
-
-impl Model {
-    /// Looks at each object where it is built. O(1) where a package names no roles.
-    pub(crate) fn no_parts(&self) -> NoParts {
-        let (mut all, mut parts) = (NoParts::default(), HashSet::new());
-        if self.roles.named.is_empty() {
-            return all;
-        }
-        for item in self.items() {
-            self.instances(item, |place, _, role| {
-                if role == Role::Part {
-                    parts.insert(place);
-                } else {
-                    all.objects.insert(place);
-                    all.uses += 1;
-                    all.any_negative |= role == Role::Negative;
-                }
-            });
-        }
-        all.objects.retain(|place| !parts.contains(place));
-        all
-    }
 }
 
 #[cfg(test)]

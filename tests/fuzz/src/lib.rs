@@ -146,13 +146,14 @@ pub fn package_of_model(text: &[u8]) -> Vec<u8> {
 /// What stands between two parts of the input of [`package_of_parts`].
 pub const BETWEEN: u8 = 0xff;
 /// The names of the parts, in the order of the input.
-const PARTS: [&str; 6] = [
+const PARTS: [&str; 7] = [
     "[Content_Types].xml",
     "_rels/.rels",
     "3D/3dmodel.model",
     "3D/_rels/3dmodel.model.rels",
     "3D/Objects/a.model",
     "Metadata/Slic3r_PE_model.config",
+    "Metadata/model_settings.config",
 ];
 
 /// A 3MF package of parts that stand in `bytes` one behind the other. An empty one is not there.

@@ -196,7 +196,8 @@ fn parts(triangles: &[Triangle]) -> Vec<u8> {
         Id=\"r\" Type=\"http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel\"/></Relationships>";
     let config = "<?xml version=\"1.0\" encoding=\"UTF-8\"?><config><object id=\"1\"><volume firstid=\"0\" lastid=\"5\"><metadata type=\"volume\" \
         key=\"volume_type\" value=\"ModelPart\"/></volume><volume firstid=\"6\" lastid=\"11\"><metadata key=\"modifier\" value=\"1\"/></volume></object></config>";
+    let roles = "<config><object id=\"2\"><part id=\"5\" subtype=\"negative_part\"><mesh_stat/></part><part id=\"5\" subtype=\"normal_part\"/></object></config>";
     let sound = forms::parts(&model, &[]);
     let [types, rels] = [0, 1].map(|k| sound[k].1);
-    [types, rels, model.as_bytes(), relationships.as_bytes(), other.as_bytes(), config.as_bytes()].join(&BETWEEN)
+    [types, rels, model.as_bytes(), relationships.as_bytes(), other.as_bytes(), config.as_bytes(), roles.as_bytes()].join(&BETWEEN)
 }

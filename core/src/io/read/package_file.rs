@@ -198,7 +198,7 @@ pub(super) fn is_repaired(object: &Object) -> bool {
 
 /// Volumes that only say where settings hold, or what is cut away.
 fn told(volumes: &Volumes, objects: &NoParts) -> Vec<Finding> {
-    let count = volumes.all().iter().filter(|volume| !volume.is_part).count() as u64 + objects.objects.len() as u64;
+    let count = volumes.all().iter().filter(|volume| !volume.is_part).count() as u64 + objects.uses;
     let of = Counted(
         count,
         "volume of a slicer's is no part of the model: it stays as it is, and is left out in another format",

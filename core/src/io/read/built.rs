@@ -20,6 +20,8 @@ use crate::contract::error::Result;
 use crate::io::record::{self, Record};
 use crate::util::words::Counted;
 
+/// A warning of volumes that are left out.
+const NEGATIVE: &str = "negative volumes of a slicer's project are among them: what they cut away is solid in the result";
 /// Records that are placed at once.
 const PLACED: usize = 16 << 10;
 /// Findings of objects that are told one by one.
@@ -105,7 +107,9 @@ fn parts(model: &Model, volumes: &[Volume], place: Place, triangles: usize) -> V
 
 /// Tells of volumes that only say where settings hold, or what is cut away, and of objects that are not wanted.
 fn left_out(model: &Model, volumes: &[Volume], wanted: fn(&Object) -> bool) -> Vec<String> {
-    let count = volumes.iter().filter(|volume| !volume.is_part).count() as u64 + model.no_parts().uses;
+    let no_parts = model.no_parts();
+    let count = volumes.iter().filter(|volume| !volume.is_part).count() as u64 + no_parts.uses;
+    let any_negative = no_parts.any_negative || volumes.iter().any(|volume| volume.is_negative);
     let of = Counted(
         count,
         "volume of a slicer's that is no part of the model, left out",
@@ -121,7 +125,9 @@ fn left_out(model: &Model, volumes: &[Volume], wanted: fn(&Object) -> bool) -> V
         "object of the build that is support, surface or no mesh of triangles, left out",
         "objects of the build that are support, surface or no meshes of triangles, left out",
     );
-    [(count, of), (others, objects)].into_iter().filter(|(count, _)| *count > 0).map(|(_, words)| words.to_string()).collect()
+    let counted =
+        [(count, of), (others, objects)].into_iter().filter(|(count, _)| *count > 0).map(|(_, words)| words.to_string());
+    counted.chain(any_negative.then(|| NEGATIVE.to_owned())).collect()
 }
 
 /// Calls `place` for each object that is wanted, where it is built, until it fails.

@@ -201,8 +201,8 @@ fn told(volumes: &Volumes, objects: &NoParts) -> Vec<Finding> {
     let count = volumes.all().iter().filter(|volume| !volume.is_part).count() as u64 + objects.uses;
     let of = Counted(
         count,
-        "volume of a slicer's is no part of the model: it stays as it is, and is left out in another format",
-        "volumes of a slicer's are no parts of the model: they stay as they are, and are left out in another format",
+        "volume of a slicer's is no part of the model: it needs no repair, and is left out in another format",
+        "volumes of a slicer's are no parts of the model: they need no repair, and are left out in another format",
     );
     let text = of.to_string();
     (count > 0).then(|| Finding { harmless: true, ..Finding::flaw(text) }).into_iter().collect()

@@ -22,7 +22,7 @@ use obj::Obj;
 use off::Off;
 use ply::Ply;
 pub(crate) use table::{CHANNELS, Corner, FaceRow, Faces, NONE, Rows, Source, State, TEXTURE, Triangle, VERTICES, WHOLE};
-pub(crate) use values::{mixed, set_position};
+pub(crate) use values::{Mix, mixed, set_position};
 
 /// What a file says besides the positions and faces of its mesh.
 pub(crate) enum Said<'a> {
@@ -40,7 +40,7 @@ impl<'a> Said<'a> {
         let (rows, says_more): (Option<Box<dyn Rows + 'a>>, bool) = match mesh.format() {
             Format::Ply => (vertices.and_then(|vertices| boxed(Ply::of(bytes, vertices)?)), ply::says_more(bytes)),
             Format::Off => (vertices.and_then(|vertices| boxed(Off::of(bytes, vertices)?)), off::says_more(bytes)),
-            Format::Obj => (vertices.and_then(|vertices| boxed(Obj::of(bytes, vertices)?)), true),
+            Format::Obj => (vertices.and_then(|vertices| boxed(Obj::of(bytes, vertices)?)), obj::says_more(bytes)),
             _ => (None, mesh.coloured() > 0),
         };
         match rows {

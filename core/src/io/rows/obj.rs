@@ -20,6 +20,23 @@ const UNSAID: [Option<&[u8]>; 4] = [None, Some(b"g default\n"), None, Some(b"s o
 /// The rows of each channel, by their keyword.
 const ROWS: [&[u8]; 3] = [b"v", b"vt", b"vn"];
 
+/// The text says more than positions and faces. O(bytes), up to the first such statement.
+pub(crate) fn says_more(text: &[u8]) -> bool {
+    let mut cursor = Cursor::of(text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(text));
+    while let Some(keyword) = cursor.keyword() {
+        let says = match channel(keyword) {
+            Some(VERTICES) => (0..5).all(|_| cursor.word().is_some()),
+            Some(_) => true,
+            None => !matches!(keyword, b"f" | b"fo"),
+        };
+        if says {
+            return true;
+        }
+        cursor.skip_line();
+    }
+    false
+}
+
 /// An OBJ.
 pub(crate) struct Obj<'a> {
     text: &'a [u8],

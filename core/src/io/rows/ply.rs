@@ -20,7 +20,7 @@ use crate::io::record::Point;
 pub(crate) fn says_more(bytes: &[u8]) -> bool {
     let is_plain = |element: &Element| match element.name.as_slice() {
         b"vertex" => element.properties.iter().all(|property| {
-            property.kind == Scalar::F32 && matches!(property.name.as_slice(), b"x" | b"y" | b"z") && property.list.is_none()
+            property.kind != Scalar::F64 && matches!(property.name.as_slice(), b"x" | b"y" | b"z") && property.list.is_none()
         }),
         b"face" | b"tristrips" => element.properties.iter().all(is_indices),
         _ => element.count == 0,
@@ -308,13 +308,14 @@ impl Rows for Ply<'_> {
 
     fn put_face(&self, triangle: &Triangle<'_>, out: &mut Vec<u8>) {
         let there = triangle.source.and_then(|source| self.cells(source.row.clone()));
+        let is_against = triangle.is_turned && there.as_ref().is_none_or(|cells| self.is_against(cells, triangle));
         for (place, property) in self.faces.element.properties.iter().enumerate() {
             let own = there.as_ref().and_then(|cells| cells.get(place)).map_or(&[][..], Vec::as_slice);
             let values = if is_indices(property) {
                 triangle.corners.map(|corner| f64::from(corner[VERTICES])).to_vec()
             } else if is_of_corners(property) {
                 of_corners(own, triangle)
-            } else if triangle.is_turned && matches!(property.name.as_slice(), b"nx" | b"ny" | b"nz") {
+            } else if is_against && matches!(property.name.as_slice(), b"nx" | b"ny" | b"nz") {
                 own.iter().map(|value| -value).collect()
             } else {
                 own.to_vec()
@@ -332,6 +333,20 @@ impl Rows for Ply<'_> {
 }
 
 impl Ply<'_> {
+    /// The normal that a face says of itself does not look where its triangle looks.
+    fn is_against(&self, cells: &[Vec<f64>], triangle: &Triangle<'_>) -> bool {
+        let value = |name: &[u8]| {
+            let place = self.faces.element.properties.iter().position(|property| property.name == name)?;
+            cells.get(place)?.first().copied()
+        };
+        let [Some(nx), Some(ny), Some(nz)] = [b"nx", b"ny", b"nz"].map(|name| value(name)) else { return true };
+        let [a, b, c] = triangle.corners.map(|corner| self.position(corner[VERTICES]).unwrap_or_default());
+        let from_a = |p: Point| [0, 1, 2].map(|k| f64::from(p[k]) - f64::from(a[k]));
+        let ([x, y, z], [u, v, w]) = (from_a(b), from_a(c));
+        let now = [y * w - z * v, z * u - x * w, x * v - y * u];
+        nx * now[0] + ny * now[1] + nz * now[2] <= 0.0
+    }
+
     /// The type of a property of faces in the output.
     fn kind_of(&self, property: &Property) -> Scalar {
         self.index.get().copied().filter(|_| is_indices(property)).unwrap_or(property.kind)

@@ -5,6 +5,8 @@
 //! **Promise:** a face that stays is written byte for byte, and so is everything that is no face. A triangle that was moved or cut takes what its
 //! face says, and of its corners the means of those that it lies between; a new one takes what most of the faces around it say.
 //!
+//! A triangle that was turned keeps the normals of its corners, and counts as one that says about what it said where they look against it now.
+//!
 //! Faces that stay or are turned come first, where they stood; all others behind them.
 
 mod made;
@@ -12,6 +14,7 @@ mod plan;
 mod spread;
 #[cfg(test)]
 mod tests;
+mod turned;
 mod votes;
 mod walk;
 mod wanted;
@@ -61,6 +64,9 @@ impl<'p> Planned<'p> {
         });
         planned.order = order;
         planned.account = planned.count();
+        let against = turned::against(rows, &planned.wanted.turned)?;
+        planned.account.kept -= against;
+        planned.account.approximated += against;
         Some(planned)
     }
 

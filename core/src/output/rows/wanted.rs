@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, HashMap};
 use std::ops::Range;
 
 use super::made::{From, Made, Parent};
+use super::turned;
 use super::votes::Votes;
 use super::walk::{Own, Step, walk};
 use crate::geometry::position;
@@ -33,14 +34,17 @@ pub(super) struct Wanted {
     pub(super) gone: u64,
     /// By triangle that is made: whose values it takes, where those around it tell.
     pub(super) winners: Vec<Option<Source>>,
+    /// Triangles that were turned, by their corners as they came, in a file that says normals at corners.
+    pub(super) turned: Vec<[Corner; 3]>,
     /// Triangles of the result so far.
     result: u32,
+    has_normals: bool,
 }
 
 impl Wanted {
     /// `None` if the file does not fit the change. O(n) in both; memory by the triangles that changed.
     pub(super) fn of(rows: &dyn Rows, change: &Change<'_>) -> Option<Self> {
-        let mut wanted = Self::default();
+        let mut wanted = Self { has_normals: turned::has_normals(rows), ..Self::default() };
         wanted.list(change);
         wanted.there = vec![None; wanted.points.len()];
         let mut filter = vec![0; wanted.points.len().next_power_of_two() / 4 + 1];
@@ -116,6 +120,9 @@ impl Wanted {
                 }
             }
             Step::Stays(own) | Step::Turned(own) => {
+                if self.has_normals && matches!(step, Step::Turned(_)) {
+                    self.turned.push(own.corners());
+                }
                 self.rows += 1;
                 self.stay(1);
                 self.note(rows, &own, Some(votes));

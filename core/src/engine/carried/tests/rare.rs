@@ -115,3 +115,62 @@ fn indices_become_wider_where_vertices_are_new() {
     let output = repaired("ply", text.as_bytes(), &Profile::default()).output;
     assert!(String::from_utf8(output).unwrap().contains("uchar char vertex_indices"));
 }
+
+/// One of two cubes is inside out. Normals that agree with its faces as they came look against them once they are turned, and others do not.
+#[test]
+fn normals_that_look_against_a_turned_face_are_told() {
+    let far = shifted(&cube(), [5.0, 0.0, 0.0]);
+    let mesh = Mesh::of(&[cube(), reversed(&far)].concat());
+    let normal = |face: &[usize]| {
+        let [a, b, c] = [0, 1, 2].map(|k| mesh.points[face[k]]);
+        let ([x, y, z], [u, v, w]) = ([0, 1, 2].map(|k| b[k] - a[k]), [0, 1, 2].map(|k| c[k] - a[k]));
+        [y * w - z * v, z * u - x * w, x * v - y * u]
+    };
+    for (sign, kept, approximated) in [(1.0, 12, 12), (-1.0, 24, 0)] {
+        let signed = |k: usize, face: &[usize]| normal(face).map(|x| if k < 12 { x } else { sign * x });
+        let mut text = String::new();
+        mesh.points.iter().for_each(|[x, y, z]| writeln!(text, "v {x} {y} {z}").unwrap());
+        let all: Vec<Point> = mesh.faces.iter().enumerate().map(|(k, face)| signed(k, face)).collect();
+        all.iter().for_each(|[x, y, z]| writeln!(text, "vn {x} {y} {z}").unwrap());
+        for (k, face) in mesh.faces.iter().enumerate() {
+            let [a, b, c] = [0, 1, 2].map(|j| face[j] + 1);
+            writeln!(text, "f {a}//{0} {b}//{0} {c}//{0}", k + 1).unwrap();
+        }
+        let attributes = repaired("obj", text.as_bytes(), &Profile::default()).report.attributes.unwrap();
+        assert_eq!((attributes.kept, attributes.approximated), (kept, approximated), "{sign}");
+        // A normal that a face of a PLY says looks where the face looks, however it looked before.
+        let mut text = format!(
+            "ply\nformat ascii 1.0\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\nelement face 24\n\
+             property list uchar int vertex_indices\nproperty float nx\nproperty float ny\nproperty float nz\nend_header\n",
+            mesh.points.len()
+        );
+        mesh.points.iter().for_each(|[x, y, z]| writeln!(text, "{x} {y} {z}").unwrap());
+        for (face, [x, y, z]) in mesh.faces.iter().zip(&all) {
+            writeln!(text, "3 {} {} {} {x} {y} {z}", face[0], face[1], face[2]).unwrap();
+        }
+        let output = String::from_utf8(repaired("ply", text.as_bytes(), &Profile::default()).output).unwrap();
+        let faces: Vec<Vec<f32>> = output
+            .lines()
+            .skip_while(|line| *line != "end_header")
+            .skip(1 + mesh.points.len())
+            .map(|line| line.split(' ').map(|word| word.parse().unwrap()).collect())
+            .collect();
+        assert_eq!(faces.len(), 24);
+        for face in faces {
+            let outward = normal(&[face[1] as usize, face[2] as usize, face[3] as usize]);
+            assert!(outward.iter().zip(&face[4..]).map(|(x, y)| x * y).sum::<f32>() > 0.0, "{sign}: {face:?}");
+        }
+    }
+}
+
+/// Nothing is lost of a file that says nothing but its mesh, in whatever form.
+#[test]
+fn plain_files_of_rare_forms_lose_nothing() {
+    let mesh = Mesh::of(&cube());
+    let mut text = String::from("\u{feff}# plain\r");
+    mesh.points.iter().for_each(|[x, y, z]| write!(text, "v {x} {y} {z}\r").unwrap());
+    mesh.faces.iter().for_each(|face| write!(text, "f {} {} {}\r", face[0] + 1, face[1] + 1, face[2] + 1).unwrap());
+    let profile = Profile { format: crate::OutputFormat::Stl, attributes: KeepAttributes::Refuse, ..Profile::default() };
+    let result = repaired("obj", text.as_bytes(), &profile);
+    assert_eq!((result.report.outcome, result.report.attributes), (Outcome::Repaired, None), "{:?}", result.report.verdict);
+}

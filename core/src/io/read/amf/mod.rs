@@ -104,13 +104,17 @@ pub(super) fn read(text: &[u8], bytes: usize, context: &Context<'_>) -> Result<P
     // Colours of the file, of objects, volumes, vertices and triangles count for one another: nobody knows whose they are.
     let is_coloured = document.is_coloured || notes.colours > 0;
     let coloured = if is_coloured { records.all().len() as u64 } else { 0 };
-    let (unit, title, doubt) = (unit_of(&document), title(&document.name), doubt(united, notes.roles + document.supports));
+    let (unit, title, doubt) =
+        (unit_of(&document), title(&document.name), doubt(united, notes.roles + document.supports, unit_of(&document)));
     let besides = Besides { unit, title, coloured, parts, doubt, ..Besides::default() };
     Ok(Parsed { records, findings, header, rounding, besides })
 }
 
 /// Why somebody should look at a repair of such a file.
-fn doubt(united: bool, roles: u64) -> Option<&'static str> {
+fn doubt(united: bool, roles: u64, unit: Option<&str>) -> Option<&'static str> {
+    if unit.is_none() {
+        return Some("its unit is none that AMF has: the result says millimetres");
+    }
     match (united, roles) {
         (_, 1..) => Some("modifiers, negative volumes or supports become parts of the model: no result keeps their roles"),
         (true, 0) => Some("its objects could not be repaired one by one: two that touch may be one body now"),
@@ -139,7 +143,7 @@ fn parts(document: &Document, parts: &[PartOf]) -> Vec<Part> {
 
 /// The name of the unit, if it is one of AMF's.
 fn unit_of(document: &Document) -> Option<&'static str> {
-    let unit = document.unit.as_deref().unwrap_or(b"millimeter");
+    let unit = document.unit.as_deref().unwrap_or(b"millimeter").trim_ascii();
     let known = [
         ("millimeter", "millimeter"),
         ("inch", "inch"),
@@ -148,7 +152,7 @@ fn unit_of(document: &Document) -> Option<&'static str> {
         ("meter", "meter"),
         ("micron", "micron"),
     ];
-    known.into_iter().find(|(name, _)| name.as_bytes() == unit).map(|(_, unit)| unit)
+    known.into_iter().find(|(name, _)| name.as_bytes().eq_ignore_ascii_case(unit)).map(|(_, unit)| unit)
 }
 
 /// What is odd about the declared encoding; a refusal of one that does not hold ASCII as it is.
@@ -182,12 +186,10 @@ fn of_text(document: &Document, notes: &Notes, behind: &[u8]) -> Vec<Finding> {
     if !document.cut_off && !behind.is_empty() && !behind.starts_with(b"<!--") {
         found.push(Finding::flaw(format!("{} behind </amf>, ignored", Counted(behind.len() as u64, "byte", "bytes"))));
     }
-    match document.unit.as_deref() {
-        None | Some(b"millimeter") => {}
-        Some(unit @ (b"inch" | b"feet" | b"foot" | b"meter" | b"micron")) => {
-            found.push(harmless(format!("unit {}", String::from_utf8_lossy(unit))));
-        }
-        Some(unit) => found.push(Finding::flaw(format!("a unit that AMF does not have: {}", shown(unit)))),
+    match (document.unit.as_deref(), unit_of(document)) {
+        (None, _) | (_, Some("millimeter")) => {}
+        (_, Some(unit)) => found.push(harmless(format!("unit {unit}"))),
+        (Some(unit), None) => found.push(Finding::flaw(format!("a unit that AMF does not have: {}", shown(unit)))),
     }
     if notes.separators == COMMA {
         found.push(Finding::flaw("decimal commas, read as points"));

@@ -32,7 +32,6 @@ struct Level {
     place: Place,
     transform: Transform,
     next: usize,
-    role: Role,
 }
 
 impl Model {
@@ -97,28 +96,23 @@ impl Model {
     pub(crate) fn instances(&self, item: &Item, mut each: impl FnMut(Place, &Transform, Role)) {
         let Some(root) = self.target(0, &item.component) else { return };
         let id = self.object(root).map_or(0, |object| object.id);
-        // The ids of another part than the first mean nothing to the slicer's roles.
-        let role_of = |part: u32, nth: usize| if root.part == 0 { self.roles.of(id, part, nth) } else { Role::Part };
-        let mut seen: HashMap<u32, usize> = HashMap::new();
-        let mut stack = vec![Level { place: root, transform: item.component.transform, next: 0, role: role_of(id, 0) }];
+        let mut meshes = 0;
+        let mut stack = vec![Level { place: root, transform: item.component.transform, next: 0 }];
         while let Some(level) = stack.last_mut() {
-            let (place, transform, next, mut role) = (level.place, level.transform, level.next, level.role);
+            let (place, transform, next) = (level.place, level.transform, level.next);
             level.next += 1;
             let is_whole = self.object(place).is_some_and(|object| !matches!(object.content, Content::Components(_)));
             match self.components(place).get(next) {
                 Some(component) => {
-                    if stack.len() == 1 {
-                        let nth = seen.entry(component.object).or_default();
-                        role = role_of(component.object, *nth);
-                        *nth += 1;
-                    }
                     if let Some(below) = self.target(place.part, component).filter(|_| stack.len() <= DEEPEST) {
-                        stack.push(Level { place: below, transform: component.transform.then(&transform), next: 0, role });
+                        stack.push(Level { place: below, transform: component.transform.then(&transform), next: 0 });
                     }
                 }
                 None => {
                     if is_whole {
-                        each(place, &transform, role);
+                        let own = self.object(place).map_or(0, |object| object.id);
+                        each(place, &transform, self.roles.of(id, own, meshes));
+                        meshes += 1;
                     }
                     stack.pop();
                 }

@@ -13,6 +13,7 @@ use quick_xml::events::{BytesStart, Event};
 use super::super::archive::{Archive, shown};
 use super::super::finding::Rejection;
 use super::super::spool::Context;
+use super::roles::Role;
 use super::{Content, Model};
 use crate::contract::error::Result;
 
@@ -93,7 +94,7 @@ impl Volumes {
 fn configs(archive: &Archive<'_>, context: &Context<'_>) -> Result<Vec<Config>> {
     let mut all: Vec<Config> = Vec::new();
     for name in CONFIGS {
-        let found = archive.entries.iter().enumerate().find(|(_, entry)| entry.name == name);
+        let found = archive.entries.iter().enumerate().find(|(_, entry)| entry.name.eq_ignore_ascii_case(name));
         let Some((number, entry)) = found else { continue };
         let text = archive.small(entry, context)?;
         let volumes = volumes(name, &text).map_err(|rejection| rejection.at(context.path))?;
@@ -170,7 +171,7 @@ pub(crate) fn volumes(name: &str, text: &[u8]) -> std::result::Result<Vec<Volume
             Event::Eof => return Ok(all),
             Event::DocType(_) => return Err(refuse("has a document type".into())),
             Event::Start(tag) | Event::Empty(tag) => match tag.local_name().as_ref() {
-                b"object" => object = value(&tag, b"id").and_then(|id| id.parse().ok()),
+                b"object" => object = value(&tag, b"id").and_then(|id| id.trim().parse().ok()),
                 b"volume" => {
                     let Some(object) = object else { continue };
                     all.push(
@@ -184,8 +185,9 @@ pub(crate) fn volumes(name: &str, text: &[u8]) -> std::result::Result<Vec<Volume
                 }
                 b"metadata" if is_within => {
                     if let Some(last) = all.last_mut() {
-                        last.is_part &= !is_modifier(&tag);
-                        last.is_negative |= is_negative(&tag);
+                        let role = role(&tag);
+                        last.is_part &= role == Role::Part;
+                        last.is_negative |= role == Role::Negative;
                     }
                 }
                 _ => {}
@@ -198,19 +200,17 @@ pub(crate) fn volumes(name: &str, text: &[u8]) -> std::result::Result<Vec<Volume
 
 fn value(tag: &BytesStart<'_>, name: &[u8]) -> Option<String> {
     let attribute = tag.try_get_attribute(name).ok()??;
-    String::from_utf8(attribute.value.into_owned()).ok()
+    let text = std::str::from_utf8(&attribute.value).ok()?;
+    Some(quick_xml::escape::unescape(text).ok()?.into_owned())
 }
 
-fn is_modifier(tag: &BytesStart<'_>) -> bool {
+/// The role that a volume's metadata gives it.
+fn role(tag: &BytesStart<'_>) -> Role {
     match (value(tag, b"key").as_deref(), value(tag, b"value").as_deref()) {
-        (Some("volume_type"), Some(kind)) => kind != "ModelPart",
-        (Some("modifier"), Some(is)) => is == "1",
-        _ => false,
+        (Some("volume_type"), Some(kind)) => Role::of(kind),
+        (Some("modifier"), Some(is)) if is.trim() == "1" => Role::Modifier,
+        _ => Role::Part,
     }
-}
-
-fn is_negative(tag: &BytesStart<'_>) -> bool {
-    value(tag, b"key").as_deref() == Some("volume_type") && value(tag, b"value").as_deref() == Some("NegativeVolume")
 }
 
 fn volume(text: &str, tag: &BytesStart<'_>, [first, last]: [&str; 2], object: u32) -> Option<Volume> {

@@ -1,6 +1,6 @@
 //! Curves of a file on their way into a network.
 
-use super::curve::{Curve, Role};
+use super::curve::{Curve, Role, Shape};
 use super::finding::Findings;
 use super::network::Use;
 use super::vector::is_finite;
@@ -11,13 +11,33 @@ pub(crate) struct Collector {
     pub(crate) curves: Vec<Curve>,
     pub(crate) findings: Findings,
     room: u64,
+    /// Numbers of curves that may still be fitted, which takes time whether they are kept or not.
+    fits: u64,
 }
 
 impl Collector {
     /// For a file of so many bytes: the numbers of all curves together are no more than 16 for each byte, which only files that place
     /// the same over and over exceed.
     pub(crate) fn new(bytes: usize) -> Self {
-        Self { room: 16 * bytes as u64 + (1 << 20), ..Self::default() }
+        let room = 16 * bytes as u64 + (1 << 20);
+        Self { room, fits: room, ..Self::default() }
+    }
+
+    /// Counts a curve that was fitted.
+    ///
+    /// # Errors
+    /// If there are too many; the curve is left out then.
+    pub(crate) fn count_fit(&mut self, shape: &Shape) -> Result<(), String> {
+        self.fits = self.fits.saturating_sub(shape.size());
+        self.may_fit()
+    }
+
+    /// Whether another curve may be fitted.
+    ///
+    /// # Errors
+    /// If there are too many of them already.
+    pub(crate) fn may_fit(&self) -> Result<(), String> {
+        if self.fits == 0 { Err("the file has too many curves that must be fitted".into()) } else { Ok(()) }
     }
 
     /// Adds a curve; gives its number.

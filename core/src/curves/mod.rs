@@ -5,8 +5,10 @@
 //! **Promise:** the same network for the same bytes; memory and time linear in the length of the file; what is damaged costs nothing
 //! of what is whole.
 
+mod carrier;
 mod collect;
 pub mod curve;
+pub mod export;
 mod finding;
 mod iges;
 mod json;

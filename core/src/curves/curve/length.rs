@@ -42,7 +42,7 @@ fn span(speed: &impl Fn(f64) -> f64, a: f64, b: f64, tolerance: f64) -> f64 {
     sum
 }
 
-fn gauss(speed: &impl Fn(f64) -> f64, a: f64, b: f64) -> f64 {
+pub(super) fn gauss(speed: &impl Fn(f64) -> f64, a: f64, b: f64) -> f64 {
     let (middle, half) = (0.5 * (a + b), 0.5 * (b - a));
     half * RULE.iter().map(|&(node, weight)| weight * (speed(middle - half * node) + speed(middle + half * node))).sum::<f64>()
 }

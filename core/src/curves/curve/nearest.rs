@@ -1,16 +1,21 @@
 //! The nearest point of a curve.
 
-use super::shape::Shape;
-use super::spline::Spline;
-use crate::curves::vector::{Point, distance, dot, sub};
+use std::cmp::Ordering;
+use std::collections::BinaryHeap;
 
-/// Samples of a curve, at most; long ones get fewer for each span.
+use super::shape::Shape;
+use super::spline::{Spline, Weighted};
+use crate::curves::vector::{Point, add, distance, dot, norm, scale, sub};
+
+/// Halvings of pieces of a curve, at most.
 const MOST: usize = 4096;
+/// A point that is nearer by less than this share of the distance is not looked for.
+const CLOSE: f64 = 1e-9;
 /// Halvings of the interval around the best sample.
 const STEPS: u32 = 60;
 
 impl Shape {
-    /// The parameter of the point that is nearest to a point: found by samples and refined, so of two that are about as near, either.
+    /// The parameter of the point that is nearest to a point: of two that are about as near, either.
     #[must_use]
     pub fn nearest(&self, point: Point) -> f64 {
         nearest(self, point)
@@ -63,26 +68,129 @@ fn on_line(a: Point, b: Point, point: Point) -> f64 {
     if share.is_finite() { share.clamp(0.0, 1.0) } else { 0.0 }
 }
 
+/// A piece of a curve that may have the nearest point; the one with the smallest bound is the greatest.
+struct Piece {
+    /// No point of it is nearer.
+    bound: f64,
+    domain: [f64; 2],
+    /// Its Bézier points.
+    points: Vec<Weighted>,
+}
+
+impl Ord for Piece {
+    fn cmp(&self, other: &Self) -> Ordering {
+        other.bound.total_cmp(&self.bound).then_with(|| other.domain[0].total_cmp(&self.domain[0]))
+    }
+}
+
+impl PartialOrd for Piece {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl PartialEq for Piece {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other) == Ordering::Equal
+    }
+}
+
+impl Eq for Piece {}
+
+/// The search for the nearest point of a curve: the piece that may have it is halved, until none may have a nearer one than is known. A curve lies in the
+/// convex hull of its Bézier points (TNB, property P4.3), so their distances along any direction bound its own.
+struct Search<'s> {
+    spline: &'s Spline,
+    point: Point,
+    /// The least distance so far, the parameter there, and how long the piece was in which it was found.
+    best: (f64, f64, f64),
+    pieces: BinaryHeap<Piece>,
+}
+
+impl Search<'_> {
+    fn near(&self, t: f64) -> f64 {
+        distance(self.spline.point_and_derivative(t).0, self.point)
+    }
+
+    fn look(&mut self, domain: [f64; 2], points: Vec<Weighted>) {
+        let [low, high] = domain;
+        for t in [low, 0.5 * (low + high), high] {
+            let here = self.near(t);
+            if here < self.best.0 {
+                self.best = (here, t, high - low);
+            }
+        }
+        let bound = bound(&points, self.point);
+        if self.may_be_nearer(bound) {
+            self.pieces.push(Piece { bound, domain, points });
+        }
+    }
+
+    fn may_be_nearer(&self, bound: f64) -> bool {
+        bound < self.best.0 * (1.0 - CLOSE)
+    }
+
+    /// Halves pieces, a bounded number of them.
+    fn run(&mut self) {
+        for _ in 0..MOST {
+            let Some(Piece { bound, domain: [low, high], points }) = self.pieces.pop() else { return };
+            let middle = 0.5 * (low + high);
+            if !self.may_be_nearer(bound) {
+                return;
+            }
+            if middle > low && middle < high {
+                let [first, second] = halves(points);
+                self.look([low, middle], first);
+                self.look([middle, high], second);
+            }
+        }
+    }
+
+    /// The parameter of the nearest point, refined by the sign of the derivative of the distance, which halves the interval down to rounding.
+    fn refined(&self) -> f64 {
+        let (_, t, around) = self.best;
+        let [first, last] = self.spline.domain();
+        let (mut low, mut high) = ((t - around).max(first), (t + around).min(last));
+        for _ in 0..STEPS {
+            let middle = 0.5 * (low + high);
+            let (place, derivative) = self.spline.point_and_derivative(middle);
+            if dot(sub(place, self.point), derivative) > 0.0 { high = middle } else { low = middle }
+        }
+        if self.near(low) < self.near(t) { low } else { t }
+    }
+}
+
 fn on_spline(spline: &Spline, point: Point) -> f64 {
-    let near = |t| distance(spline.point_and_derivative(t).0, point);
-    let cuts = spline.cuts();
-    let each = (MOST / cuts.len().max(1)).clamp(1, 2 * spline.degree() + 4);
-    let stride = cuts.len().div_ceil(MOST);
-    let mut samples: Vec<f64> = Vec::new();
-    let coarse: Vec<f64> = cuts.iter().copied().step_by(stride).chain(cuts.last().copied()).collect();
-    for pair in coarse.windows(2) {
-        let &[a, b] = pair else { continue };
-        samples.extend((0..each).map(|number| a + (b - a) * number as f64 / each as f64));
+    let mut search = Search { spline, point, best: (f64::INFINITY, spline.domain()[0], 0.0), pieces: BinaryHeap::new() };
+    spline.beziers().into_iter().for_each(|(domain, points)| search.look(domain, points));
+    search.run();
+    search.refined()
+}
+
+/// No point in the convex hull of these is nearer.
+fn bound(points: &[Weighted], from: Point) -> f64 {
+    let places = || points.iter().map(|&[x, y, z, weight]| sub([x / weight, y / weight, z / weight], from));
+    let count = points.len().max(1) as f64;
+    let middle = places().fold([0.0; 3], |sum, place| add(sum, scale(place, 1.0 / count)));
+    let length = norm(middle);
+    if length == 0.0 {
+        return 0.0;
     }
-    samples.extend(cuts.last());
-    let best = samples.iter().map(|&t| near(t)).enumerate().min_by(|a, b| a.1.total_cmp(&b.1)).map_or(0, |(at, _)| at);
-    let sample = |number: usize| samples.get(number.min(samples.len().saturating_sub(1))).copied().unwrap_or_default();
-    let (mut low, mut high) = (sample(best.saturating_sub(1)), sample(best + 1));
-    // The sign of the derivative of the distance; it halves the interval down to rounding.
-    for _ in 0..STEPS {
-        let middle = 0.5 * (low + high);
-        let (place, derivative) = spline.point_and_derivative(middle);
-        if dot(sub(place, point), derivative) > 0.0 { high = middle } else { low = middle }
+    places().map(|place| dot(place, middle) / length).fold(f64::INFINITY, f64::min).max(0.0)
+}
+
+/// Both halves of a curve by its Bézier points (TNB A5.8 at the middle; de Casteljau).
+fn halves(mut points: Vec<Weighted>) -> [Vec<Weighted>; 2] {
+    let (mut first, mut second) = (Vec::with_capacity(points.len()), Vec::with_capacity(points.len()));
+    while let (Some(one), Some(other)) = (points.first(), points.last()) {
+        first.push(*one);
+        second.push(*other);
+        let pairs = points.windows(2);
+        points = pairs
+            .filter_map(|pair| <&[Weighted; 2]>::try_from(pair).ok())
+            .map(|[a, b]| [0, 1, 2, 3].map(|k| 0.5 * (a[k] + b[k])))
+            .collect();
     }
-    [low, sample(best)].into_iter().min_by(|a, b| near(*a).total_cmp(&near(*b))).unwrap_or_default()
+    second.reverse();
+    [first, second]
 }

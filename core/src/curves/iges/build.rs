@@ -35,6 +35,8 @@ pub(super) struct Builder<'a> {
     /// Edges of lists (504): curve, and numbers of the lists and places of both vertices.
     pub(super) edges: HashMap<u32, Rc<[[u32; 5]]>>,
     pub(super) vertices: HashMap<(u32, u32, Place), u64>,
+    /// Of the file, in its unit.
+    pub(super) resolution: Option<f64>,
     /// Composites that are being read.
     open: Vec<u32>,
     /// Bytes of parameters that may still be read: those of an entity that many refer to count each time.
@@ -56,6 +58,7 @@ impl<'a> Builder<'a> {
             done: HashSet::new(),
             edges: HashMap::new(),
             vertices: HashMap::new(),
+            resolution: None,
             open: Vec::new(),
             room: 16 * bytes + (1 << 20),
             instances: 0,
@@ -66,12 +69,13 @@ impl<'a> Builder<'a> {
     /// Reads everything.
     pub(super) fn network(mut self, global: Global) -> Network {
         let directory = self.directory;
+        self.resolution = global.resolution;
         let is_top = |builder: &Self, entry: &Entry| {
             let used = builder.relations.get(entry.number);
             !used.as_part && !used.as_member
         };
         for entry in &directory.entries {
-            if matches!(entry.kind, 143 | 144 | 186 | 408 | 430 | 510 | 514) && is_top(&self, entry) {
+            if matches!(entry.kind, 143 | 144 | 186 | 408 | 412 | 414 | 430 | 510 | 514) && is_top(&self, entry) {
                 self.thing(entry, HERE, 0);
             }
         }
@@ -152,7 +156,8 @@ impl<'a> Builder<'a> {
                     is_untrimmed: true,
                 });
             }
-            let is_read = matches!(entry.kind, 102 | 124 | 141..=144 | 186 | 308 | 408 | 430 | 502 | 504 | 508 | 510 | 514);
+            let is_read =
+                matches!(entry.kind, 102 | 124 | 141..=144 | 186 | 308 | 408 | 412 | 414 | 430 | 502 | 504 | 508 | 510 | 514);
             if !is_read && !self.done.contains(&entry.number) && !shapes::is_curve(entry) {
                 self.collector.findings.unread(entry.line, name(entry.kind, entry.form));
             }
@@ -199,7 +204,7 @@ impl<'a> Builder<'a> {
             return around;
         }
         match self.places.matrix(self.directory, entry.matrix) {
-            Ok(map) => self.places.within(around, entry.matrix, || map),
+            Ok(map) => self.places.within(around, (entry.matrix, 0), || map),
             Err(why) => {
                 let text = format!("D{}: {}", entry.number, legible(&why));
                 self.collector.findings.add(entry.line, "an entity is read without its matrix", text);
@@ -215,6 +220,7 @@ impl<'a> Builder<'a> {
         }
         match entry.kind {
             408 => self.instance(entry, around, depth),
+            412 | 414 => self.array(entry, around, depth),
             430 => self.solid_instance(entry, around, depth),
             186 | 514 => self.faces_of(entry, around, depth),
             143 | 144 | 510 => self.face(entry, around),
@@ -229,9 +235,8 @@ impl<'a> Builder<'a> {
 
     /// 408: a subfigure (308), shifted and scaled.
     fn instance(&mut self, entry: &Entry, around: Place, depth: usize) {
-        self.instances += 1;
-        if self.instances > MOST_INSTANCES {
-            return self.flaw(entry, "more than a million instances of subfigures");
+        if !self.count_instance(entry) {
+            return;
         }
         let Some(parameters) = self.parameters(entry) else { return };
         let read = || -> Result<_, String> {
@@ -248,12 +253,26 @@ impl<'a> Builder<'a> {
         };
         self.done.insert(entry.number);
         let around = self.placed(entry, around);
-        let place = self.places.within(around, entry.number, || map);
-        let Some(parameters) = self.parameters(&figure) else { return };
-        let place = self.placed(&figure, place);
+        let place = self.places.within(around, (entry.number, 0), || map);
+        self.figure(&figure, place, depth);
+    }
+
+    /// Whether another instance may be read.
+    pub(super) fn count_instance(&mut self, entry: &Entry) -> bool {
+        self.instances = self.instances.saturating_add(1);
+        if self.instances > MOST_INSTANCES {
+            self.flaw(entry, "more than a million instances of subfigures");
+        }
+        self.instances <= MOST_INSTANCES
+    }
+
+    /// 308: all that a subfigure has.
+    pub(super) fn figure(&mut self, figure: &Entry, place: Place, depth: usize) {
+        let Some(parameters) = self.parameters(figure) else { return };
+        let place = self.placed(figure, place);
         self.done.insert(figure.number);
         let count = parameters.count(3, 4, 1).unwrap_or_else(|why| {
-            self.damaged(&figure, &why);
+            self.damaged(figure, &why);
             parameters.len().saturating_sub(4)
         });
         for number in (4..4 + count).filter_map(|at| parameters.pointer(at).ok()) {
@@ -298,11 +317,18 @@ impl<'a> Builder<'a> {
     }
 
     fn curve(&mut self, entry: &Entry, place: Place) -> Option<Use> {
-        if !shapes::is_curve(entry) {
+        if !shapes::is_curve(entry) && entry.kind != 130 {
             return None;
         }
         let parameters = self.parameters(entry)?;
-        match shapes::shape(entry, &parameters) {
+        if shapes::is_cloud(entry, &parameters) {
+            if self.done.insert(entry.number) {
+                self.collector.findings.unread(entry.line, name(entry.kind, entry.form));
+            }
+            return None;
+        }
+        let read = if entry.kind == 130 { self.offset(&parameters, 0) } else { shapes::shape(entry, &parameters) };
+        match read {
             Ok((shape, odd)) => {
                 self.done.insert(entry.number);
                 self.digits = self.digits.max(parameters.digits);

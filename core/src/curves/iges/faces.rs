@@ -88,8 +88,7 @@ impl Builder<'_> {
         };
         self.done.insert(entry.number);
         if number == 0 {
-            self.flaw(entry, "a boundary is given in the space of parameters alone; it has no curves");
-            return Some(Vec::new());
+            return Some(self.boundary_of_parameters(entry, &parameters, place));
         }
         self.curves(number, place, 0).map(|uses| uses.to_vec())
     }

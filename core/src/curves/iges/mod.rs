@@ -6,6 +6,7 @@
 //! Based on: *Initial Graphics Exchange Specification 5.3*, U.S. Product Data Association 1996; types of entities are called by their numbers
 //! there.
 
+mod arrays;
 mod build;
 mod cards;
 mod compressed;
@@ -13,10 +14,12 @@ mod directory;
 mod faces;
 mod global;
 mod names;
+mod offsets;
 mod parameters;
 mod places;
 mod relations;
 mod shapes;
+mod surfaces;
 #[cfg(test)]
 mod tests;
 

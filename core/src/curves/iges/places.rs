@@ -17,7 +17,7 @@ const DEEPEST: usize = 32;
 #[derive(Debug)]
 pub(super) struct Places {
     maps: Vec<Affine>,
-    known: HashMap<(Place, u32), Place>,
+    known: HashMap<(Place, (u32, u32)), Place>,
     matrices: HashMap<u32, Affine>,
 }
 
@@ -31,8 +31,9 @@ impl Places {
         self.maps.get(place).copied().unwrap_or(Affine::IDENTITY)
     }
 
-    /// The placement of what an entry places by its map, within another placement.
-    pub(super) fn within(&mut self, around: Place, entry: u32, map: impl FnOnce() -> Affine) -> Place {
+    /// The placement of what an entry places by its map, within another placement. Of an entry that places the same several
+    /// times, the second number is that of the place.
+    pub(super) fn within(&mut self, around: Place, entry: (u32, u32), map: impl FnOnce() -> Affine) -> Place {
         if let Some(place) = self.known.get(&(around, entry)) {
             return *place;
         }

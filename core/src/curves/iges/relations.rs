@@ -92,7 +92,7 @@ impl Relations {
 }
 
 fn refers(kind: u32) -> bool {
-    matches!(kind, 102 | 118 | 120 | 122 | 130 | 140..=144 | 186 | 308 | 408 | 430 | 504 | 508 | 510 | 514)
+    matches!(kind, 102 | 118 | 120 | 122 | 130 | 140..=144 | 186 | 308 | 408 | 412 | 414 | 430 | 504 | 508 | 510 | 514)
 }
 
 fn references(entry: &Entry, parameters: &Parameters, note: &mut impl FnMut(u32, Used)) -> Result<(), String> {
@@ -129,28 +129,27 @@ fn references(entry: &Entry, parameters: &Parameters, note: &mut impl FnMut(u32,
             }
             Ok(())
         }
-        142 => {
-            note(parameters.pointer(3)?, Used::PARAMETRIC);
-            note(parameters.pointer(4)?, Used::PART);
-            Ok(())
-        }
-        118 | 120 => {
-            note(parameters.pointer(1)?, Used::GENERATOR);
-            note(parameters.pointer(2)?, Used::GENERATOR);
-            Ok(())
-        }
-        122 | 130 => {
-            note(parameters.pointer(1)?, Used::GENERATOR);
-            Ok(())
-        }
-        140 => {
-            note(parameters.pointer(5)?, Used::SURFACE);
-            Ok(())
-        }
         141 => boundary(parameters, note),
         186 => solid(parameters, note),
         508 => loops(parameters, note),
-        _ => Ok(()),
+        kind => single(kind).iter().try_for_each(|(at, used)| {
+            note(parameters.pointer(*at)?, *used);
+            Ok(())
+        }),
+    }
+}
+
+/// Parameters of a type that refer to one other entity each.
+fn single(kind: u32) -> &'static [(usize, Used)] {
+    match kind {
+        118 | 120 => &[(1, Used::GENERATOR), (2, Used::GENERATOR)],
+        122 => &[(1, Used::GENERATOR)],
+        // The curve beside which it goes, and the one whose coordinate is the distance.
+        130 => &[(1, Used::GENERATOR), (3, Used::GENERATOR)],
+        140 => &[(5, Used::SURFACE)],
+        142 => &[(3, Used::PARAMETRIC), (4, Used::PART)],
+        412 | 414 => &[(1, Used::MEMBER)],
+        _ => &[],
     }
 }
 

@@ -3,13 +3,13 @@
 use super::directory::Entry;
 use super::parameters::Parameters;
 use crate::curves::curve::{Arc, CurveError, Shape, Spline, conic};
-use crate::curves::vector::{Point, distance, norm};
+use crate::curves::vector::{Point, distance, dot, norm, sub, unit};
 
 /// Whether an entity is a curve on its own, not made of others.
 pub(super) fn is_curve(entry: &Entry) -> bool {
     match entry.kind {
         100 | 104 | 112 | 126 => true,
-        106 => matches!(entry.form, 11 | 12 | 13 | 63),
+        106 => matches!(entry.form, 1..=3 | 11 | 12 | 13 | 63),
         110 => entry.form == 0,
         _ => false,
     }
@@ -24,7 +24,7 @@ pub(super) fn shape(entry: &Entry, parameters: &Parameters) -> Result<(Shape, Op
     match entry.kind {
         100 => circle(parameters),
         104 => conic_arc(parameters),
-        106 => whole(copious(entry, parameters)),
+        106 => copious(entry, parameters),
         110 => whole(line(parameters)),
         112 => parametric_spline(parameters),
         126 => whole(rational_spline(parameters)),
@@ -71,7 +71,7 @@ fn conic_arc(parameters: &Parameters) -> Result<(Shape, Option<String>), String>
 }
 
 /// 106: how points are given, how many, at which height, and the points.
-fn copious(entry: &Entry, parameters: &Parameters) -> Result<Shape, String> {
+fn points(entry: &Entry, parameters: &Parameters) -> Result<Vec<Point>, String> {
     let (each, from) = match parameters.integer(1)? {
         1 => (2, 4),
         2 => (3, 3),
@@ -89,7 +89,29 @@ fn copious(entry: &Entry, parameters: &Parameters) -> Result<Shape, String> {
     if entry.form == 63 && points.first() != points.last() {
         points.extend(points.first().copied());
     }
-    Shape::polyline(points).map_err(said)
+    Ok(points)
+}
+
+/// 106 as a curve. Forms 1 to 3 do not say that points are joined; they are where they lie as those of a path do.
+fn copious(entry: &Entry, parameters: &Parameters) -> Result<(Shape, Option<String>), String> {
+    let points = points(entry, parameters)?;
+    let is_told = entry.form > 10;
+    let count = points.len();
+    let odd =
+        (!is_told).then(|| format!("{count} points, read as a polyline although the file does not say that they are joined"));
+    Shape::polyline(points).map(|shape| (shape, odd)).map_err(said)
+}
+
+/// Whether an entity is points (106, forms 1 to 3) that are no path.
+pub(super) fn is_cloud(entry: &Entry, parameters: &Parameters) -> bool {
+    entry.kind == 106 && entry.form < 11 && points(entry, parameters).is_ok_and(|points| !is_path(&points))
+}
+
+/// Whether points lie as those of a path: on the way from each to the next, none turns by more than 120°.
+fn is_path(points: &[Point]) -> bool {
+    let steps: Vec<Point> =
+        points.windows(2).filter_map(|pair| if let &[a, b] = pair { unit(sub(b, a)) } else { None }).collect();
+    !steps.is_empty() && steps.windows(2).all(|pair| if let &[a, b] = pair { dot(a, b) > -0.5 } else { true })
 }
 
 /// 112: cubic polynomials between break points, as Bézier curves one behind the other.

@@ -278,3 +278,210 @@ proptest! {
         let _ = read(&text);
     }
 }
+
+/// Beside a line, a quarter of a circle, and half an ellipse; the last one with a distance that grows along a line.
+#[test]
+fn offset_curves_are_read() {
+    // Those beside which they go are read before them.
+    let free = |network: &Network| network.curves.iter().find(|curve| curve.role == Role::Free).unwrap().shape.clone();
+    let line = network(&[(130, 0, 0, 0, "3,1,0,0,0,2.,0.,0.,0.,0.,0.,1.,0.,1."), (110, 0, 0, 10000, "0.,0.,0.,4.,0.,0.")]);
+    assert_eq!((free(&line).ends(), texts(&line)), ([[0.0, 2.0, 0.0], [4.0, 2.0, 0.0]], vec![]));
+    assert_eq!((line.curves[0].role, line.curves[1].source.id), (Role::Generator, Id::Directory(1)));
+    let arc = network(&[(130, 0, 0, 0, "3,1,0,0,0,.5,0.,0.,0.,0.,0.,1.,0.,9."), (100, 0, 0, 10000, "0.,0.,0.,2.,0.,0.,2.")]);
+    assert!((free(&arc).kind() == "circle") && (free(&arc).length(1e-12) - 0.75 * PI).abs() < 1e-12);
+    // The ellipse x²/4 + y² = 1, outward by 1: at its ends on both axes the distance is seen.
+    let half =
+        [(130, 0, 0, 0, "3,1,0,0,0,-1.,0.,0.,0.,0.,0.,1.,0.,0."), (104, 1, 0, 10000, ".25,0.,1.,0.,0.,-1.,0.,2.,0.,-2.,0.")];
+    let ellipse = network(&half);
+    let shape = free(&ellipse);
+    let [low, high] = shape.domain();
+    assert!(
+        distance(shape.ends()[0], [3.0, 0.0, 0.0]) < 1e-9 && distance(shape.point(0.5 * (low + high)), [0.0, 2.0, 0.0]) < 1e-5
+    );
+    assert!(texts(&ellipse)[0].starts_with("4: an odd curve: D1: beside another one; fitted within"), "{:?}", texts(&ellipse));
+    let tapered = network(&[(130, 0, 0, 0, "3,2,0,0,1,0.,0.,2.,4.,0.,0.,1.,0.,1."), (110, 0, 0, 10000, "0.,0.,0.,4.,0.,0.")]);
+    assert_eq!(free(&tapered).ends(), [[0.0; 3], [4.0, 2.0, 0.0]]);
+    // A composite of both: its second half alone, by its parameters; and one that goes beside itself.
+    let path = [
+        (130, 0, 0, 0, "3,1,0,0,0,1.,0.,0.,0.,0.,0.,1.,1.,2."),
+        (102, 0, 0, 10000, "2,5,7"),
+        (110, 0, 0, 10000, "0.,0.,0.,4.,0.,0."),
+        (110, 0, 0, 10000, "4.,0.,0.,4.,4.,0."),
+    ];
+    assert_eq!(free(&network(&path)), Shape::Line([[3.0, 0.0, 0.0], [3.0, 4.0, 0.0]]));
+    let round = network(&[(130, 0, 0, 0, "1,1,0,0,0,1.,0.,0.,0.,0.,0.,1.,0.,1."), (110, 0, 0, 0, "0.,0.,0.,4.,0.,0.")]);
+    assert!(texts(&round)[0].contains("one within itself"), "{:?}", texts(&round));
+}
+
+/// A line in two columns of three, turned by a quarter and scaled, without two of them; a subfigure around a circle, two of its
+/// four places.
+#[test]
+fn arrays_place_their_instances() {
+    let quarter = FRAC_PI_2.to_string();
+    let rows = format!("3,2.,10.,0.,1.,2,3,5.,7.,{quarter},2,1,2,6");
+    let array = network(&[(412, 0, 0, 0, rows.as_str()), (110, 0, 0, 10000, "0.,0.,0.,1.,0.,0.")]);
+    assert_eq!(texts(&array), Vec::<String>::new());
+    let starts: Vec<_> = array.curves.iter().map(|curve| curve.shape.ends()[0]).collect();
+    // Up is to the left now, across is up: places 1, 3, 4 and 5.
+    let expected = [[10.0, 0.0, 1.0], [-4.0, 0.0, 1.0], [10.0, 5.0, 1.0], [3.0, 5.0, 1.0]];
+    assert!(starts.len() == 4 && starts.iter().zip(expected).all(|(start, expected)| distance(*start, expected) < 1e-12));
+    // None is turned.
+    let [start, end] = array.curves[0].shape.ends();
+    assert_eq!([end[0] - start[0], end[1] - start[1]], [2.0, 0.0]);
+    let circle = format!("3,4,0.,0.,0.,2.,0.,{quarter},2,0,2,3");
+    let figure = [
+        (414, 0, 0, 0, circle.as_str()),
+        (308, 0, 0, 20200, "0,4HLINE,1,5"),
+        (110, 0, 0, 10000, "0.,0.,0.,1.,0.,0."),
+        (412, 0, 0, 0, "1,1.,0.,0.,100.,1,2,0.,50.,0.,0,0"),
+    ];
+    let nested = network(&figure);
+    let starts: Vec<_> = nested.curves.iter().map(|curve| curve.shape.ends()[0]).collect();
+    let expected = [[0.0, 2.0, 100.0], [-2.0, 0.0, 100.0], [0.0, 52.0, 100.0], [-2.0, 50.0, 100.0]];
+    assert!(starts.len() == 4 && starts.iter().zip(expected).all(|(start, expected)| distance(*start, expected) < 1e-12));
+    // More places than there may be, in an array that repeats itself.
+    let round = network(&[(412, 0, 0, 0, "1,1.,0.,0.,0.,100000,100000,1.,1.,0.,0,0"), (110, 0, 0, 0, "0.,0.,0.,1.,0.,0.")]);
+    assert_eq!(round.curves.len(), 1);
+}
+
+/// Pairs, triples, and triples with vectors; what goes to and fro is no path.
+#[test]
+fn copious_points_are_paths_where_they_lie_so() {
+    let path = |form: u32, values: &str| network(&[(106, form, 0, 0, values)]);
+    let pairs = path(1, "1,3,7.,0.,0.,1.,0.,1.,1.");
+    assert_eq!(pairs.curves[0].shape, Shape::Polyline(vec![[0.0, 0.0, 7.0], [1.0, 0.0, 7.0], [1.0, 1.0, 7.0]]));
+    assert!(texts(&pairs)[0].contains("an odd curve: D1: 3 points, read as a polyline"), "{:?}", texts(&pairs));
+    let triples = path(2, "2,2,0.,0.,0.,1.,2.,3.");
+    assert_eq!(triples.curves[0].shape.ends(), [[0.0; 3], [1.0, 2.0, 3.0]]);
+    let vectors = path(3, "3,2,0.,0.,0.,0.,0.,1.,1.,2.,3.,0.,0.,1.");
+    assert_eq!(vectors.curves[0].shape.ends(), [[0.0; 3], [1.0, 2.0, 3.0]]);
+    let cloud = path(1, "1,4,0.,0.,0.,5.,0.,0.,1.,5.,1.");
+    assert_eq!(texts(&cloud), ["0: the file has no curve in space", "4: not read: 1 × 106 (points)"]);
+}
+
+/// The same entities in the compressed form: of each directory entry the fields that differ from those of the entry before, then
+/// the parameters on lines of `width`.
+fn compressed(entities: &[Entity<'_>], width: usize) -> String {
+    let mut fields: [String; 21] = Default::default();
+    let mut data = String::new();
+    for (at, (kind, form, matrix, status, values)) in entities.iter().enumerate() {
+        let number = 2 * at + 1;
+        let mut head = format!("D{number}");
+        let own = [(1, kind.to_string()), (7, matrix.to_string()), (9, format!("{status:08}")), (15, form.to_string())];
+        for (field, value) in own.into_iter().chain([(18, "LABEL".to_owned()), (19, number.to_string())]) {
+            if fields[field] != value {
+                head += &format!("@{field}_{value}");
+                fields[field] = value;
+            }
+        }
+        data += &format!("{head};\n");
+        chunks(&format!("{kind},{values};"), width).iter().for_each(|line| data += &format!("{line}\n"));
+    }
+    let head = cards('C', &[String::new()]) + &cards('S', &["by hand".into()]) + &cards('G', &chunks(MM, 72));
+    head + &data + &cards('T', &["S      1G      2".into()])
+}
+
+/// All that a network has but for lines, which differ between both forms.
+fn without_lines(mut network: Network) -> Network {
+    network.curves.iter_mut().for_each(|curve| curve.source.line = 0);
+    network.faces.iter_mut().for_each(|face| face.source.line = 0);
+    network.findings.iter_mut().for_each(|finding| finding.line = 0);
+    network.findings.sort();
+    network
+}
+
+proptest! {
+    #[test]
+    fn both_forms_say_the_same(picks in prop::collection::vec(0_usize..8, 1..20), width in 20_usize..72) {
+        // Each stands on its own, or refers to the first two.
+        let pool = [
+            (110, 0, 1, 10000, "0.,0.,0.,1.D1,2.5E0,-.5"),
+            (100, 0, 0, 0, "3.,1.,1.,3.,1.,1.,3."),
+            (106, 12, 0, 1010100, "2,3,0.,0.,0.,1.,0.,0.,1.,1.,1."),
+            (126, 0, 1, 0, "1,1,0,0,1,0,0.,0.,1.,1.,1.,1.,0.,0.,0.,1.,1.,1.,0.,1.,0.,0.,0."),
+            (144, 0, 0, 0, "1,0,0,0"),
+            (130, 0, 0, 0, "3,1,0,0,0,2.,0.,0.,0.,0.,0.,1.,0.,1."),
+            (412, 0, 1, 0, "3,1.,0.,0.,0.,2,1,1.,0.,0.,0,0"),
+            (999, 3, 0, 0, "1,2HAB,,3"),
+        ];
+        let mut entities: Vec<Entity<'_>> = vec![
+            (124, 0, 0, 10000, "1.,0.,0.,5.,0.,1.,0.,0.,0.,0.,1.,0."),
+            (110, 0, 0, 10000, "0.,0.,0.,4.,0.,0."),
+        ];
+        entities.extend(picks.into_iter().map(|pick| pool[pick]));
+        let both = [fixed(MM, &entities), compressed(&entities, width)].map(|text| without_lines(read(text.as_bytes()).unwrap()));
+        prop_assert_eq!(&both[0], &both[1]);
+    }
+}
+
+/// A B-spline surface (128) that is a plane from (0, 0, 1) to (4, 2, 1) over parameters from 0 to 1, and a boundary of parameters
+/// alone: a rectangle as a composite of four lines. Then the same on a cylinder: drawn (122), turned (120), and ruled (118),
+/// where one side is a helix.
+#[test]
+fn boundaries_of_parameters_alone_are_composed() {
+    let face = |surface: (u32, u32, u32, u32, &'static str), more: &[Entity<'static>]| {
+        let mut entities: Vec<Entity<'static>> = vec![
+            (144, 0, 0, 0, "5,1,0,3"),
+            (142, 0, 0, 10000, "0,5,7,0,1"),
+            surface,
+            (102, 0, 0, 10500, "3,9,11,13"),
+            (110, 0, 0, 10500, "0.25,0.,0.,0.75,0.,0."),
+            (110, 0, 0, 10500, "0.75,0.,0.,0.75,1.,0."),
+            (110, 0, 0, 10500, "0.75,1.,0.,0.25,0.,0."),
+        ];
+        entities.extend(more);
+        let network = network(&entities);
+        assert_eq!(network.faces[0].outer.len(), 3, "{:?}", texts(&network));
+        let shapes: Vec<Shape> = network.faces[0].outer.iter().map(|one| network.curves[one.curve].shape.clone()).collect();
+        for (one, next) in shapes.iter().zip(shapes.iter().cycle().skip(1)) {
+            assert!(distance(one.ends()[1], next.ends()[0]) < 1e-9);
+        }
+        (shapes, texts(&network))
+    };
+    let plane = "1,1,1,1,0,0,1,0,0,0.,0.,1.,1.,0.,0.,1.,1.,1.,1.,1.,1.,0.,0.,1.,4.,0.,1.,0.,2.,1.,4.,2.,1.,0.,1.,0.,1.";
+    let (shapes, found) = face((128, 0, 0, 10000, plane), &[]);
+    let triangle = [[1.0, 0.0, 1.0], [3.0, 0.0, 1.0], [3.0, 2.0, 1.0]];
+    assert_eq!(shapes, [0, 1, 2].map(|at| Shape::Line([triangle[at], triangle[(at + 1) % 3]])));
+    assert!(found[0].ends_with("alone: D3 of type 142; its curves are composed exactly"), "{found:?}");
+    // Half a circle of radius 2, drawn up by 3: a quarter, a line, and a helix back.
+    let arc = (100, 0, 0, 10000, "0.,0.,0.,2.,0.,-2.,0.");
+    let (drawn, found) = face((122, 0, 0, 10000, "15,2.,0.,3."), &[arc]);
+    assert_eq!((drawn[0].kind(), drawn[1].kind()), ("circle", "line"));
+    assert!((drawn[2].length(1e-9) - PI.hypot(3.0)).abs() < 1e-4 && found[0].contains("fitted within"), "{found:?}");
+    // The same from a line that is turned by half a circle; its parameter comes first, so here 0.25 to 0.75 is upwards.
+    let line = (110, 0, 0, 10000, "2.,0.,0.,2.,0.,3.");
+    let (turned, _) = face((120, 0, 0, 10000, "15,17,0.,3.141592653589793"), &[(110, 0, 0, 10000, "0.,0.,0.,0.,0.,1."), line]);
+    assert_eq!(turned[0], Shape::Line([[2.0, 0.0, 0.75], [2.0, 0.0, 2.25]]));
+    assert!((turned[1].length(1e-12) - 2.0).abs() < 1e-12 && turned[1].kind() == "circle");
+    let upper = (100, 0, 0, 10000, "3.,0.,0.,2.,0.,-2.,0.");
+    let (ruled, _) = face((118, 1, 0, 10000, "15,17,0,0"), &[arc, upper]);
+    assert!((ruled[0].length(1e-9) - PI).abs() < 1e-4 && distance(ruled[2].ends()[0], drawn[2].ends()[0]) < 1e-9);
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(300))]
+
+    /// Offsets, arrays, boundaries of parameters: whatever is damaged, it ends.
+    #[test]
+    fn no_damage_of_what_is_made_of_others_is_too_much(changes in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..12)) {
+        let entities = [
+            (144, 0, 0, 0, "5,1,0,3"),
+            (142, 0, 0, 10000, "0,5,7,0,1"),
+            (128, 0, 0, 10000, "1,1,1,1,0,0,1,0,0,0.,0.,1.,1.,0.,0.,1.,1.,1.,1.,1.,1.,0.,0.,1.,4.,0.,1.,0.,2.,1.,4.,2.,2.,0.,1.,0.,1."),
+            (102, 0, 0, 10500, "2,9,11"),
+            (110, 0, 0, 10500, "0.25,0.,0.,0.75,1.,0."),
+            (100, 0, 0, 10500, "0.,.5,.5,.75,.5,.5,.75"),
+            (130, 0, 0, 0, "15,2,0,0,1,1.,0.,2.,1.,0.,0.,1.,0.,0."),
+            (104, 1, 0, 10000, ".25,0.,1.,0.,0.,-1.,0.,2.,0.,-2.,0."),
+            (412, 0, 0, 0, "15,2.,10.,0.,1.,2,3,5.,7.,0.5,2,1,2,6"),
+            (414, 0, 0, 0, "17,4,0.,0.,0.,2.,0.,1.,2,0,2,3"),
+        ];
+        let mut text = fixed(MM, &entities).into_bytes();
+        for (at, byte) in changes {
+            let at = at.index(text.len());
+            // Digits are changed into others, so that what is read is often still a file.
+            text[at] = if text[at].is_ascii_digit() { b'0' + byte % 10 } else { byte };
+        }
+        let _ = read(&text);
+    }
+}

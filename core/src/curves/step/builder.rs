@@ -49,6 +49,8 @@ pub(super) struct Builder<'a> {
     /// Radians of the unit of angles, and the uncertainty, where it reads now.
     pub(super) angle: f64,
     pub(super) uncertainty: f64,
+    /// Whether it reads a curve of two dimensions now.
+    pub(super) is_flat: bool,
     /// What curves are for that it reads now.
     pub(super) role: Role,
     pub(super) shape_items: Option<HashSet<u64>>,
@@ -78,6 +80,7 @@ impl<'a> Builder<'a> {
             digits: 0,
             angle: 1.0,
             uncertainty: 0.0,
+            is_flat: false,
             role: Role::Free,
             shape_items: None,
             aspects: HashSet::new(),

@@ -240,6 +240,8 @@ impl<'a> Builder<'a> {
                 let Some(Basis::Bounded(shape)) = self.basis(record.reference(1)?, depth + 1)? else { return Ok(None) };
                 Basis::Bounded(shape.transformed(&map))
             }
+            "OFFSET_CURVE_3D" => return self.offset(id, record, depth),
+            "PCURVE" if !self.is_flat => return self.pcurve(id, record, depth),
             "PCURVE" | "DEGENERATE_PCURVE" => {
                 self.note_unread(id, "curve in the space of parameters of a surface");
                 return Ok(None);

@@ -8,8 +8,14 @@ impl Builder<'_> {
     /// CARTESIAN_POINT: three coordinates. Two are a point in the space of parameters, or of a drawing.
     pub(super) fn point(&mut self, id: u64) -> Result<Point, String> {
         let record = self.record(id, &["CARTESIAN_POINT"])?;
-        let numbers = record.numbers(1)?;
+        let mut numbers = record.numbers(1)?;
+        if self.is_flat {
+            numbers.resize(if numbers.len() == 2 { 3 } else { 0 }, 0.0);
+        }
         let point = numbers.as_slice().try_into().map_err(|_| format!("#{id} has {} coordinates", numbers.len()))?;
+        if self.is_flat {
+            return Ok(point);
+        }
         if let Some(place) = self.index.get(id) {
             let words = self.index.text(place).split(|byte| matches!(byte, b',' | b'(' | b')'));
             let numbers =
@@ -20,9 +26,12 @@ impl Builder<'_> {
     }
 
     /// DIRECTION, of length 1.
-    fn direction(&mut self, id: u64) -> Result<Point, String> {
+    pub(super) fn direction(&mut self, id: u64) -> Result<Point, String> {
         let record = self.record(id, &["DIRECTION"])?;
-        let numbers = record.numbers(1)?;
+        let mut numbers = record.numbers(1)?;
+        if self.is_flat {
+            numbers.resize(if numbers.len() == 2 { 3 } else { 0 }, 0.0);
+        }
         let [x, y, z] = numbers.as_slice().try_into().map_err(|_| format!("#{id} has {} components", numbers.len()))?;
         unit([x, y, z]).ok_or_else(|| format!("#{id} is a direction without length"))
     }
@@ -35,8 +44,14 @@ impl Builder<'_> {
     }
 
     /// AXIS2_PLACEMENT_3D, AXIS1_PLACEMENT: the map that takes the axes there. An axis that is missing or damaged is the usual one, a first axis
-    /// along the third any other one.
+    /// along the third any other one. AXIS2_PLACEMENT_2D of a curve of two dimensions.
     pub(super) fn frame(&mut self, id: u64) -> Result<Affine, String> {
+        if self.is_flat {
+            let record = self.record(id, &["AXIS2_PLACEMENT_2D"])?;
+            let origin = self.point(record.reference(1)?)?;
+            let x = record.reference(2).ok().map(|id| self.direction(id)).transpose()?.unwrap_or([1.0, 0.0, 0.0]);
+            return Ok(Affine::from_axes(axes(x, [0.0, 0.0, 1.0]), origin));
+        }
         let record = self.record(id, &["AXIS2_PLACEMENT_3D", "AXIS1_PLACEMENT"])?;
         let origin = self.point(record.reference(1)?)?;
         let mut direction = |at: usize| record.reference(at).ok().map(|id| self.direction(id)).transpose();

@@ -10,12 +10,16 @@ mod build;
 mod builder;
 mod curves;
 mod edges;
+mod extents;
 mod faces;
 mod frame;
 mod index;
 mod items;
+mod offsets;
+mod pcurves;
 mod record;
 mod splines;
+mod surfaces;
 #[cfg(test)]
 mod tests;
 mod text;

@@ -54,7 +54,7 @@ impl Builder<'_> {
 }
 
 /// Knots as often as they are repeated; it is known how many there must be.
-fn repeated(multiplicities: &[f64], knots: &[f64], count: usize) -> Result<Vec<f64>, String> {
+pub(super) fn repeated(multiplicities: &[f64], knots: &[f64], count: usize) -> Result<Vec<f64>, String> {
     let sum: f64 = multiplicities.iter().sum();
     let is_whole = multiplicities.iter().all(|number| number.fract() == 0.0 && *number > 0.0);
     if multiplicities.len() != knots.len() || !is_whole || sum != count as f64 {
@@ -64,7 +64,7 @@ fn repeated(multiplicities: &[f64], knots: &[f64], count: usize) -> Result<Vec<f
 }
 
 /// Each inner knot as often as the degree.
-fn bezier(count: usize, degree: usize) -> Result<Vec<f64>, String> {
+pub(super) fn bezier(count: usize, degree: usize) -> Result<Vec<f64>, String> {
     if count <= degree || !(count - 1).is_multiple_of(degree) {
         return Err(format!("{count} points for Bézier curves of degree {degree}"));
     }
@@ -76,7 +76,7 @@ fn bezier(count: usize, degree: usize) -> Result<Vec<f64>, String> {
 }
 
 /// Both ends repeated, one step from knot to knot between.
-fn quasi_uniform(count: usize, degree: usize) -> Vec<f64> {
+pub(super) fn quasi_uniform(count: usize, degree: usize) -> Vec<f64> {
     let pieces = count.saturating_sub(degree);
     let mut knots = vec![0.0; degree];
     knots.extend((0..=pieces).map(|number| number as f64));

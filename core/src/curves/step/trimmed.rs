@@ -2,6 +2,7 @@
 
 use super::builder::Builder;
 use super::curves::Basis;
+use super::extents;
 use super::record::{Record, Value};
 use crate::curves::curve::Shape;
 use crate::curves::vector::{Point, distance, norm};
@@ -18,7 +19,10 @@ impl Builder<'_> {
     pub(super) fn trimmed(&mut self, record: &Record<'_>, depth: usize) -> Result<Option<Shape>, String> {
         let id = record.reference(1)?;
         let Some(basis) = self.basis(id, depth + 1)? else { return Ok(None) };
-        let trims = [self.trim(record.list(2)?)?, self.trim(record.list(3)?)?];
+        let mut trims = [self.trim(record.list(2)?)?, self.trim(record.list(3)?)?];
+        if let (Basis::Bounded(shape), true) = (&basis, trims.iter().any(|trim| trim.parameter.is_some())) {
+            self.count(id, shape, &mut trims, depth)?;
+        }
         let is_same = record.truth(4)?;
         let by_point = record.values.get(5).and_then(Value::word).is_some_and(|word| word.is("CARTESIAN"));
         let ends = self.ends(id, &basis, trims, by_point)?;
@@ -50,16 +54,34 @@ impl Builder<'_> {
         }
     }
 
+    /// Turns parameters of a composite into those of its shape. Where there are points as well, these count: programs differ in
+    /// how they count the parameter of a composite.
+    fn count(&mut self, id: u64, shape: &Shape, trims: &mut [Trim; 2], depth: usize) -> Result<(), String> {
+        let is_needed = trims.iter().any(|trim| trim.point.is_none());
+        let extents = match self.extents(id, depth) {
+            Ok(Some(extents)) => extents,
+            Ok(None) => return Ok(()),
+            Err(why) if is_needed => return Err(why),
+            Err(_) => Vec::new(),
+        };
+        // Parameters of arcs are angles in the file's unit, which are turned into radians later.
+        let unit = if matches!(shape, Shape::Arc(_)) { self.angle } else { 1.0 };
+        for trim in trims {
+            let told = trim.parameter.filter(|_| trim.point.is_none());
+            trim.parameter = told.map(|told| extents::parameter(&extents, shape, told) / unit);
+        }
+        Ok(())
+    }
+
     /// Parameters of both ends. Where point and parameter are told and do not fit, the points count.
     fn ends(&mut self, id: u64, basis: &Basis, trims: [Trim; 2], by_point: bool) -> Result<[f64; 2], String> {
         let is_angle = matches!(basis, Basis::Bounded(Shape::Arc(_)));
         let unit = if is_angle { self.angle } else { 1.0 };
-        let is_composite = matches!(basis, Basis::Bounded(Shape::Composite(_)));
         let mut ends = [0.0; 2];
         let points = trims.map(|trim| trim.point);
         let reach = if let [Some(a), Some(b)] = points { distance(a, b).max(1e-3 * (norm(a) + norm(b))) } else { f64::INFINITY };
         for (end, trim) in ends.iter_mut().zip(trims) {
-            let told = trim.parameter.map(|parameter| parameter * unit).filter(|_| !is_composite);
+            let told = trim.parameter.map(|parameter| parameter * unit);
             let found = trim.point.map(|point| basis.parameter(point));
             let fits = match (told, trim.point) {
                 (Some(told), Some(point)) => distance(basis.point(told), point) <= 1e-3 * reach,
@@ -72,7 +94,7 @@ impl Builder<'_> {
                 (Some(told), None) => told,
                 (Some(told), Some(_)) if fits && !by_point => told,
                 (_, Some(found)) => found,
-                (None, None) => return Err("a composite that is trimmed by parameters".into()),
+                (None, None) => return Err("an end that is neither point nor parameter".into()),
             };
         }
         Ok(ends)

@@ -1,0 +1,2 @@
+mod read_back;
+mod samples;

@@ -17,6 +17,7 @@ mod algorithms;
 mod attributes;
 mod contract;
 pub mod curves;
+mod defeature;
 mod detect;
 mod diagnosis;
 mod engine;
@@ -146,5 +147,5 @@ pub fn repair_mesh<'m>(
     limits: &Limits,
     progress: &dyn Progress,
 ) -> error::Result<RepairedMesh> {
-    engine::memory::repair(mesh.into(), repairs::Steps::All, profile, limits, progress)
+    engine::memory_making::repair(mesh.into(), profile, limits, progress)
 }

@@ -6,14 +6,17 @@ use std::time::Duration;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
-use suture_core::OutputFormat;
 use suture_store::Priority;
 use suture_store::job::Kind;
 
-use crate::units::{parse_duration, parse_format, parse_listen, parse_size};
+use crate::units::{parse_duration, parse_listen, parse_size};
+use meshes::{ConvertArgs, DefeatureArgs, InspectArgs, RepairArgs};
 use service::{CompletionsArgs, CurvesArgs, ManArgs, NightArgs, StatusArgs, StoreArgs, TopArgs};
+use spend::Spend;
 
+pub(crate) mod meshes;
 pub(crate) mod service;
+pub(crate) mod spend;
 
 /// A build for crash tests says so, lest it be installed.
 const VERSION: &str = if cfg!(feature = "crash-points") {
@@ -48,6 +51,8 @@ pub(crate) enum LogFormat {
 pub(crate) enum Command {
     /// Repair files: write the repaired meshes, and say what was wrong and what was done
     Repair(RepairArgs),
+    /// Repair files, and remove small holes, fillets, grooves and bosses
+    Defeature(DefeatureArgs),
     /// Diagnose files and write nothing
     #[command(visible_alias = "check")]
     Inspect(InspectArgs),
@@ -105,156 +110,6 @@ Needs no configuration. These folders are made under DIR:
 Nothing is ever overwritten: a second part.stl becomes part~2.stl. Ctrl-C or SIGTERM stops taking files and finishes those in
 work; a second one stops at once, and the files are taken up again at the next start. SIGHUP makes a daemon with --config read its file
 anew; a file with a mistake in it changes nothing.";
-
-/// The purpose of each profile.
-const PROFILE_HELP: &str = "\
-Profile: a name, or a TOML file of settings [default: default]
-
-default       repairs what can be repaired
-fast          leaves out what takes time and no valid surface needs: the search for
-              self-intersections (the verdict calls them unchecked), the shaping of patches
-strict        small mending only; what changes more, or cannot be proved, is a person's
-cautious      welds and drops what is surplus, closes, cuts and wraps nothing
-scan          larger holes and wider gaps, for scanned surfaces
-inspect-only  repairs nothing: a good file is passed on as it is, of any other nothing
-              is written";
-
-/// What the machine may spend; never changes a result.
-#[derive(Args, Debug, Clone)]
-pub(crate) struct Spend {
-    /// Memory the work may hold, e.g. 512MiB; larger files stream through it [default: 1GiB]
-    #[arg(long, value_name = "SIZE", value_parser = parse_size)]
-    pub memory: Option<u64>,
-    /// Threads to use [default: all processors]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
-    pub threads: Option<u16>,
-    /// Triangles in a chunk
-    #[arg(long, value_name = "N", hide = true, value_parser = clap::value_parser!(u32).range(1..))]
-    pub chunk_triangles: Option<u32>,
-    /// Sort triangles by place into a file first: always, never, or where it helps
-    #[arg(long, value_enum, hide = true, default_value = "auto")]
-    pub spill: Spill,
-}
-
-/// As the engine's own, for the command line.
-#[derive(Debug, Clone, Copy, ValueEnum)]
-pub(crate) enum Guarantee {
-    /// Leave it; only a file that passed every check is good
-    Strict,
-    /// Replace it by a surface around what it encloses
-    Wrap,
-    /// Leave it; a check that was not made does not keep a file from being good
-    Off,
-}
-
-impl From<Guarantee> for suture_core::Guarantee {
-    fn from(guarantee: Guarantee) -> Self {
-        match guarantee {
-            Guarantee::Strict => Self::Strict,
-            Guarantee::Wrap => Self::Wrap,
-            Guarantee::Off => Self::Off,
-        }
-    }
-}
-
-/// As the engine's own, for the command line.
-#[derive(Debug, Clone, Copy, ValueEnum)]
-pub(crate) enum Spill {
-    Auto,
-    Always,
-    Never,
-}
-
-impl Spend {
-    /// As the engine takes it.
-    pub(crate) fn limits(&self, list_edit: bool) -> suture_core::Limits {
-        let mut limits = suture_core::Limits::default().with_edit_listed(list_edit);
-        limits.memory_bytes = self.memory.unwrap_or(limits.memory_bytes);
-        limits.threads = self.threads.map_or(limits.threads, usize::from);
-        limits.chunk_triangles = self.chunk_triangles.unwrap_or(limits.chunk_triangles);
-        limits.spill = match self.spill {
-            Spill::Auto => suture_core::Spill::Auto,
-            Spill::Always => suture_core::Spill::Always,
-            Spill::Never => suture_core::Spill::Never,
-        };
-        limits
-    }
-}
-
-#[derive(Args, Debug)]
-pub(crate) struct RepairArgs {
-    /// Mesh files: STL, 3MF, PLY, OFF, OBJ, AMF
-    #[arg(required = true, value_name = "IN")]
-    pub inputs: Vec<PathBuf>,
-    /// Where to write: a file name, or a folder (needed for several inputs; part.stl, then part~2.stl)
-    #[arg(short, long, value_name = "OUT|DIR")]
-    pub output: PathBuf,
-    /// Format of the result: stl, 3mf, ply, off, obj or amf [default: that of OUT's ending, or else of IN]
-    #[arg(long, value_name = "FORMAT", value_parser = parse_format)]
-    pub format: Option<OutputFormat>,
-    /// Write the full report as JSON to this file (for several inputs: into this folder)
-    #[arg(long, value_name = "FILE")]
-    pub report: Option<PathBuf>,
-    /// Profile: default, fast, strict, cautious, scan, inspect-only, or a TOML file of settings
-    #[arg(long, value_name = "NAME|FILE", default_value = "default", long_help = PROFILE_HELP, hide_default_value = true)]
-    pub profile: String,
-    /// Do not look for self-intersections: faster, but the verdict then calls them unchecked
-    #[arg(long)]
-    pub no_self_intersections: bool,
-    /// What to do with geometry that no repair can turn into a solid [default: the profile's: wrap; strict in strict and cautious]
-    #[arg(long, value_enum)]
-    pub guarantee: Option<Guarantee>,
-    #[command(flatten)]
-    pub spend: Spend,
-    /// Print reports as JSON, one a line, instead of tables
-    #[arg(long)]
-    pub json: bool,
-    /// List every deleted, flipped, moved and added triangle in the report
-    #[arg(long)]
-    pub list_edit: bool,
-    /// Replace the result and the report if they exist, in a folder too (an input is never replaced)
-    #[arg(long)]
-    pub force: bool,
-}
-
-#[derive(Args, Debug)]
-pub(crate) struct InspectArgs {
-    /// Mesh files: STL, 3MF, PLY, OFF, OBJ, AMF
-    #[arg(required = true, value_name = "IN")]
-    pub inputs: Vec<PathBuf>,
-    /// Profile: default, fast, strict, cautious, scan, inspect-only, or a TOML file of settings
-    #[arg(long, value_name = "NAME|FILE", default_value = "default", long_help = PROFILE_HELP, hide_default_value = true)]
-    pub profile: String,
-    /// Do not look for self-intersections: faster, but the verdict then calls them unchecked
-    #[arg(long)]
-    pub no_self_intersections: bool,
-    /// Check the certificate in this report, as written by repair or inspect, against the bytes of IN as they are now
-    #[arg(long, value_name = "REPORT", conflicts_with_all = ["json", "profile", "no_self_intersections"])]
-    pub certificate: Option<PathBuf>,
-    /// Check its second half, too: repair the file that IN was made of anew, and compare
-    #[arg(long, value_name = "FILE", requires = "certificate")]
-    pub original: Option<PathBuf>,
-    #[command(flatten)]
-    pub spend: Spend,
-    /// Print reports as JSON, one a line, instead of tables
-    #[arg(long)]
-    pub json: bool,
-}
-
-#[derive(Args, Debug)]
-pub(crate) struct ConvertArgs {
-    /// A mesh file: STL, 3MF, PLY, OFF, OBJ, AMF
-    #[arg(value_name = "IN")]
-    pub input: PathBuf,
-    /// The file to write; its ending says the format
-    #[arg(value_name = "OUT")]
-    pub output: PathBuf,
-    /// Replace OUT if it exists
-    #[arg(long)]
-    pub force: bool,
-    #[command(flatten)]
-    pub spend: Spend,
-}
 
 #[derive(Args, Debug)]
 pub(crate) struct ReportArgs {

@@ -5,7 +5,7 @@ use std::path::Path;
 use suture_core::report::{Converted, FileFacts};
 use suture_core::{OutputFormat, Quiet, words};
 
-use crate::cli::ConvertArgs;
+use crate::cli::meshes::ConvertArgs;
 use crate::draft::Draft;
 use crate::exit::Exit;
 use crate::fsx;

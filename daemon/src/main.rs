@@ -114,6 +114,7 @@ fn main() -> ExitCode {
     logging::start(level, cli.log_format);
     let exit = match &cli.command {
         Command::Repair(args) => single::repair(args),
+        Command::Defeature(args) => single::defeature(args),
         Command::Inspect(args) => single::inspect(args),
         Command::Convert(args) => convert::run(args),
         Command::Curves(args) => curves::run(args),

@@ -10,7 +10,7 @@ use std::sync::{Mutex, PoisonError};
 use suture_core::OutputFormat;
 
 use crate::alike::{Alike, folded};
-use crate::cli::RepairArgs;
+use crate::cli::meshes::RepairArgs;
 use crate::fsx;
 use crate::receipt::REPORT;
 

@@ -7,7 +7,7 @@ use suture_core::report::Certificate;
 use suture_core::{OutputFormat, Profile};
 
 use crate::batch::Batch;
-use crate::cli::{InspectArgs, RepairArgs};
+use crate::cli::meshes::{DefeatureArgs, InspectArgs, RepairArgs};
 use crate::exit::Exit;
 use crate::fsx;
 use crate::item::Order;
@@ -18,7 +18,33 @@ use crate::signals::Stop;
 
 /// Repairs every input and prints what was done.
 pub(crate) fn repair(args: &RepairArgs) -> Exit {
+    repair_under(args, |_| Ok(()))
+}
+
+/// Repairs every input, and removes small features.
+pub(crate) fn defeature(args: &DefeatureArgs) -> Exit {
+    repair_under(&args.repair, |profile| {
+        let limits = [
+            (args.holes_below, &mut profile.remove_holes_below_mm),
+            (args.fillets_below, &mut profile.remove_fillets_below_mm),
+            (args.grooves_below, &mut profile.remove_grooves_below_mm),
+            (args.bosses_below, &mut profile.remove_bosses_below_mm),
+        ];
+        let mut any = false;
+        for (asked, limit) in limits {
+            *limit = asked.unwrap_or(*limit);
+            any |= *limit > 0.0;
+        }
+        let help =
+            "give at least one of --holes-below, --fillets-below, --grooves-below, --bosses-below, or a profile that says it";
+        if any { Ok(()) } else { Err(format!("no feature is to be removed: {help}")) }
+    })
+}
+
+/// Repairs every input under the profile of the command line, which `change` changes.
+fn repair_under(args: &RepairArgs, change: impl FnOnce(&mut Profile) -> Result<(), String>) -> Exit {
     let order = profiles::of_command(&args.profile, args.no_self_intersections).and_then(|mut profile| {
+        change(&mut profile)?;
         profile.guarantee = args.guarantee.map_or(profile.guarantee, Into::into);
         let of_name = || args.output.extension().and_then(|ending| OutputFormat::of_ending(ending.to_str()?));
         let is_folder = fsx::is_folder(&args.output).unwrap_or(false);

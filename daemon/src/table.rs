@@ -66,6 +66,7 @@ pub(crate) fn render(report: &Report) -> String {
     if report.outcome == Outcome::Clean && report.input.findings.is_empty() {
         let copied = if report.output.is_some() { ", copied byte for byte" } else { "" };
         line(&mut out, format_args!("{name}: clean{copied} ({}; {}; {})", size(report), report.verdict.statement, rate(report)));
+        features(&mut out, report);
         hints(&mut out, report);
         return out;
     }
@@ -80,6 +81,7 @@ pub(crate) fn render(report: &Report) -> String {
         let note = if repair.note.is_empty() { String::new() } else { format!(": {}", repair.note) };
         item(&mut out, "done", &format!("{}{times}{note}", repair.name.as_str().replace('_', " ")));
     }
+    features(&mut out, report);
     for left in report.loops_left.iter().take(LOOPS_SHOWN) {
         let what = format!("loop of {} edges at {}: {}", show_count(left.edges), show_point(&left.at), left.reason);
         item(&mut out, "left", &what);
@@ -117,6 +119,27 @@ pub(crate) fn render(report: &Report) -> String {
 fn hints(out: &mut String, report: &Report) {
     for hint in &report.hints {
         item(out, "hint", &hint.text);
+    }
+}
+
+/// Features that were removed or left, those with a reason first.
+fn features(out: &mut String, report: &Report) {
+    let Some(features) = &report.features else { return };
+    let counted = |count: u64, words: &str| format!("{} {words}", show_count(count));
+    let gone = format!("{} gone, {} added", triangles(features.triangles_gone), show_count(features.triangles_added));
+    item(out, "feature", &format!("{}, {}: {gone}", counted(features.removed, "removed"), counted(features.left, "left")));
+    if let Some(reason) = &features.why_not {
+        item(out, "", reason);
+    }
+    let (left, removed): (Vec<_>, Vec<_>) = features.listed.iter().partition(|feature| feature.left.is_some());
+    for feature in left.into_iter().chain(removed).take(LOOPS_SHOWN) {
+        let place = show_point(&feature.centre.map(|x| x as f32));
+        let fate = feature.left.as_ref().map_or_else(|| "removed".to_owned(), |reason| format!("left, since {reason}"));
+        item(out, "", &format!("{} of {} at {place}: {fate}", feature.kind.replace('-', " "), show_number(feature.size)));
+    }
+    if features.listed.len() > LOOPS_SHOWN {
+        let more = show_count(features.removed + features.left - LOOPS_SHOWN as u64);
+        item(out, "", &format!("{more} more, listed in the report"));
     }
 }
 

@@ -17,6 +17,15 @@ fn split(text: &str) -> Option<(f64, &str)> {
     Some((number, unit.trim()))
 }
 
+/// Reads a length in the units of a file.
+///
+/// # Errors
+/// A line for people when the text is no number above zero.
+pub(crate) fn parse_length(text: &str) -> Result<f64, String> {
+    let length = text.trim().parse().ok().filter(|length: &f64| length.is_finite() && *length > 0.0);
+    length.ok_or_else(|| format!("`{text}` is no length above zero (try 3 or 0.5; in the units of the file)"))
+}
+
 /// Bytes from `1GiB`, `512 MiB`, `2G` (binary), `1.5GB` (decimal), `4096`.
 ///
 /// # Errors

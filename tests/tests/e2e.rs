@@ -10,6 +10,7 @@ mod e2e {
     mod companions;
     mod config;
     mod curves;
+    mod features;
     mod files;
     mod formats;
     mod heard;

@@ -15,10 +15,11 @@ use std::path::{Path, PathBuf};
 use imports::Imports;
 
 /// The folders of the engine, each of which may import those before it, and only those.
-const ROOMS: [&str; 15] = [
+const ROOMS: [&str; 16] = [
     "util",
     "contract",
     "curves",
+    "defeature",
     "attributes",
     "io",
     "geometry",

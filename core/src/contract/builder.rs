@@ -97,6 +97,10 @@ impl ProfileBuilder {
         check_self_intersections: bool,
         build_volume_mm: [f64; 3],
         thin_wall_mm: f64,
+        remove_holes_below_mm: f64,
+        remove_fillets_below_mm: f64,
+        remove_grooves_below_mm: f64,
+        remove_bosses_below_mm: f64,
     }
 }
 

@@ -10,6 +10,7 @@ pub(crate) mod builder;
 pub(crate) mod defects;
 pub(crate) mod edit_report;
 pub mod error;
+pub(crate) mod features;
 pub(crate) mod file_facts;
 pub(crate) mod finite;
 pub(crate) mod hint;

@@ -41,9 +41,12 @@ impl Range {
     }
 }
 
-/// Variables that are settings, each with its name, value and range.
+/// Settings of a profile that are one number, each with its name, value and range. All other fields are named, so that a new one cannot be forgotten.
 macro_rules! with_ranges {
-    ($($setting:ident: $range:ident),* $(,)?) => { [$((stringify!($setting), *$setting, Range::$range)),*] };
+    ($profile:expr; $($setting:ident: $range:ident),*; others: $($other:ident),* $(,)?) => {{
+        let Profile { $($setting,)* $($other: _),* } = $profile;
+        [$((stringify!($setting), *$setting, Range::$range)),*]
+    }};
 }
 
 impl Profile {
@@ -61,57 +64,10 @@ impl Profile {
         Ok(())
     }
 
-    /// Every setting that is one number, not a whole one and not a choice, with its range. All fields are named, so that a new one cannot be forgotten here.
-    fn numbers(&self) -> [(&'static str, f64, Range); 24] {
-        let Self {
-            name: _,
-            weld_relative,
-            weld_max_edge_share,
-            sew_relative,
-            gap_edge_share,
-            max_hole_perimeter_relative,
-            max_hole_perimeter_mm,
-            max_gap_mm,
-            max_volume_change,
-            max_area_change,
-            max_box_change_relative,
-            skin_reach_relative,
-            max_skin_lost,
-            max_skin_invented,
-            max_cavities_filled,
-            debris_area_share,
-            sheet_thickness_relative,
-            sheet_thickness_mm,
-            max_sheets_share,
-            stack_gap_relative,
-            max_separation_relative,
-            wrap_max_share,
-            wrap_max_move,
-            wrap_review_share,
-            thin_wall_mm,
-            // Counts: each value of their type means something, 0 and the largest included.
-            max_hole_edges: _,
-            max_bodies_lost: _,
-            debris_triangles: _,
-            // Several numbers.
-            build_volume_mm: _,
-            // Choices.
-            repair: _,
-            format: _,
-            attributes: _,
-            leave_open: _,
-            close_sheets: _,
-            fill_holes: _,
-            patch_shape: _,
-            sheets: _,
-            bodies: _,
-            hollow: _,
-            separate: _,
-            guarantee: _,
-            resolve_crossings: _,
-            check_self_intersections: _,
-        } = self;
+    /// Every setting that is one number, not a whole one and not a choice, with its range.
+    fn numbers(&self) -> [(&'static str, f64, Range); 28] {
         with_ranges![
+            self;
             weld_relative: Share, weld_max_edge_share: Share, sew_relative: Share, gap_edge_share: Bound,
             max_hole_perimeter_relative: Bound, max_hole_perimeter_mm: Bound, max_gap_mm: Bound,
             max_volume_change: Bound, max_area_change: Bound, max_box_change_relative: Bound,
@@ -119,6 +75,10 @@ impl Profile {
             sheet_thickness_relative: Share, sheet_thickness_mm: Bound, max_sheets_share: Share,
             stack_gap_relative: Share, max_separation_relative: Share, wrap_max_share: Share, wrap_max_move: Bound,
             wrap_review_share: Share, thin_wall_mm: Bound,
+            remove_holes_below_mm: Bound, remove_fillets_below_mm: Bound, remove_grooves_below_mm: Bound, remove_bosses_below_mm: Bound;
+            // Counts, each value of whose type means something, 0 and the largest included; several numbers; choices.
+            others: name, max_hole_edges, max_bodies_lost, debris_triangles, build_volume_mm, repair, format, attributes, leave_open,
+            close_sheets, fill_holes, patch_shape, sheets, bodies, hollow, separate, guarantee, resolve_crossings, check_self_intersections,
         ]
     }
 }

@@ -71,6 +71,8 @@ pub enum RepairName {
     Rebuild,
     /// A region was replaced by a surface around the space that it encloses.
     Wrap,
+    /// Features below the sizes that the profile names were removed, and the faces around them continued.
+    Defeature,
 }
 
 impl RepairName {
@@ -103,6 +105,7 @@ impl RepairName {
         Self::Separate,
         Self::Rebuild,
         Self::Wrap,
+        Self::Defeature,
     ];
 
     /// Words for its work, which follow "by".
@@ -135,6 +138,7 @@ impl RepairName {
             Self::Separate => "separating surfaces that met",
             Self::Rebuild => "cutting places out and closing them anew",
             Self::Wrap => "wrapping regions",
+            Self::Defeature => "removing small features",
         }
     }
 
@@ -168,6 +172,7 @@ impl RepairName {
             Self::Separate => "separate",
             Self::Rebuild => "rebuild",
             Self::Wrap => "wrap",
+            Self::Defeature => "defeature",
         }
     }
 }
@@ -186,7 +191,7 @@ mod tests {
     #[test]
     fn every_kind_is_listed_once() {
         assert!(RepairName::ALL.iter().enumerate().all(|(place, name)| *name as usize == place));
-        assert_eq!(*RepairName::ALL.last().unwrap(), RepairName::Wrap);
+        assert_eq!(*RepairName::ALL.last().unwrap(), RepairName::Defeature);
     }
 
     #[test]

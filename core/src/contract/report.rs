@@ -2,6 +2,7 @@
 
 pub use crate::contract::defects::{Defects, SelfIntersections};
 pub use crate::contract::edit_report::{EditRecords, EditSummary, FaceOrigin};
+pub use crate::contract::features::{Feature, Features};
 pub use crate::contract::file_facts::{Converted, FileFacts, Format};
 pub use crate::contract::hint::{Hint, HintKind};
 pub use crate::contract::judgement::{Certificate, Faithful, Fidelity, RuleOutcome, RuleResult, Verdict};
@@ -96,6 +97,9 @@ pub struct Report {
     /// Walls thinner than the profile's minimum; `None` if there is no minimum, or a hint says why it was not looked.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub thin_walls: Option<ThinWalls>,
+    /// Small features that were removed; `None` if the profile removes none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub features: Option<Features>,
     /// Seconds by stage, in order.
     pub stages: Vec<Stage>,
     /// Where the time went and what it cost.

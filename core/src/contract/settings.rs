@@ -110,6 +110,14 @@ pub struct Profile {
     pub build_volume_mm: [f64; 3],
     /// Walls thinner than this, in the file's units, are looked for in the result, and get a hint. 0: they are not.
     pub thin_wall_mm: f64,
+    /// Holes of a smaller diameter than this, in the file's units, are removed from the result, through or blind. 0: none.
+    pub remove_holes_below_mm: f64,
+    /// Fillets of a smaller radius than this, and narrower chamfers, are removed. 0: none.
+    pub remove_fillets_below_mm: f64,
+    /// Grooves, slots and pockets narrower than this are removed, engraved letters among them. 0: none.
+    pub remove_grooves_below_mm: f64,
+    /// Bosses lower than this are removed, embossed letters among them. 0: none.
+    pub remove_bosses_below_mm: f64,
 }
 
 /// What to do with geometry that no repair can turn into a solid.
@@ -298,6 +306,10 @@ impl Default for Profile {
             check_self_intersections: true,
             build_volume_mm: [0.0; 3],
             thin_wall_mm: 0.0,
+            remove_holes_below_mm: 0.0,
+            remove_fillets_below_mm: 0.0,
+            remove_grooves_below_mm: 0.0,
+            remove_bosses_below_mm: 0.0,
         }
     }
 }

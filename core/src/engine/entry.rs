@@ -10,7 +10,7 @@ use crate::engine::clock::Clock;
 use crate::engine::package;
 use crate::engine::parts;
 use crate::engine::work::Work;
-use crate::engine::{files, formats, judging};
+use crate::engine::{files, formats, judging, making};
 use crate::io::read::PackageFile;
 
 /// Diagnoses `input` and writes nothing.
@@ -60,7 +60,7 @@ pub(crate) fn repair(input: &Path, output: &Path, profile: &Profile, limits: &Li
         None => formats::into_stl(mesh, output, target, Work { profile, limits, progress }, &mut clock)?,
         Some(layout) => {
             let make = |mesh, spool: &Path, clock: &mut Clock| {
-                files::make(mesh, spool, target.is_input, (profile, limits), progress, clock)
+                making::make(mesh, spool, target.is_input, Work { profile, limits, progress }, clock)
             };
             formats::through_a_spool(
                 (mesh, input),

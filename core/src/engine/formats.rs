@@ -13,7 +13,9 @@ use crate::contract::report::{Converted, Format, Report};
 use crate::contract::settings::{KeepAttributes, Limits, OutputFormat, Profile, folder_of};
 use crate::engine::carried;
 use crate::engine::clock::Clock;
+use crate::engine::copying;
 use crate::engine::files::{self, Made};
+use crate::engine::making;
 use crate::engine::work::Work;
 use crate::geometry::position;
 use crate::io::disk_space::{self, Need};
@@ -102,7 +104,7 @@ pub(crate) fn into_stl(mesh: MeshFile, output: &Path, target: Target, work: Work
     let nameless = if is_at_risk { Some(Nameless::new(limits)?) } else { None };
     let spool = nameless.as_ref().map(Nameless::path);
     let doubt = mesh.doubt();
-    let made = files::make(mesh, spool.as_deref().unwrap_or(output), target.is_input, (profile, limits), progress, clock)?;
+    let made = making::make(mesh, spool.as_deref().unwrap_or(output), target.is_input, work, clock)?;
     let mut report = made.report.clone();
     carried::ask_if_doubtful(&mut report, doubt);
     if report.output.is_none() {
@@ -117,7 +119,7 @@ pub(crate) fn into_stl(mesh: MeshFile, output: &Path, target: Target, work: Work
         return Ok(report);
     }
     if let Some(spool) = spool {
-        let written = copy(&spool, output, limits, progress)?;
+        let written = copying::copy(&spool, output, limits, progress)?;
         report.output = Some(files::facts(&written, files::hash(&written, limits, progress)));
     }
     Ok(report)
@@ -156,7 +158,7 @@ pub(crate) fn through_a_spool(
         return Ok(report);
     }
     let written = if is_copy {
-        copy(input, output, limits, progress)?
+        copying::copy(input, output, limits, progress)?
     } else {
         let judged = files::open(&spool, limits, progress)?;
         write(&Whole { made: &judged, ..Whole::of(&made.mesh, input) }, output, (planned, layout), work, clock)?
@@ -239,7 +241,7 @@ pub(crate) fn convert(
             confirm(&mesh, &written, limits)?;
             written
         }
-        _ => copy(input, output, limits, progress)?,
+        _ => copying::copy(input, output, limits, progress)?,
     };
     mesh.check_unchanged()?;
     let facts = |mesh: &MeshFile| files::facts(mesh, files::hash(mesh, limits, progress));
@@ -306,15 +308,6 @@ fn check_space(mesh: &MeshFile, output: &Path, layout: Option<Layout>, limits: &
         needs.push(Need { folder: limits.spool_folder(), bytes: triangles * bytes, what: "the text of the package" });
     }
     disk_space::check(mesh.path(), &needs)
-}
-
-/// Copies the file `input` to the new file `output`, and opens the copy.
-pub(crate) fn copy(input: &Path, output: &Path, limits: &Limits, progress: &dyn Progress) -> Result<MeshFile> {
-    let mesh = files::open(input, limits, progress)?;
-    let (written, _) = emit::draft(&mesh, output, limits, progress, |draft| draft.finish(&Content::Input))?;
-    written.durable()?;
-    mesh.check_unchanged()?;
-    files::open(output, limits, progress)
 }
 
 /// Writes a mesh to the new file `output`, in meshes of their own where there are several and the format holds them; reads the file back, and compares.

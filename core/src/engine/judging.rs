@@ -72,6 +72,7 @@ pub(crate) fn begin(task: Task, input: &Input<'_>, diagnosis: &Diagnosis<'_>, pr
         objects: Vec::new(),
         attributes: None,
         thin_walls: None,
+        features: None,
         stages: Vec::new(),
         cost: Cost::default(),
     }
@@ -233,6 +234,11 @@ pub(crate) fn add_first(report: &mut Report, name: RepairName, count: u64, note:
         Some(repair) => repair.count += count,
         None => report.repairs.insert(0, Repair { name, count, note: note.into(), seconds: 0.0 }),
     }
+}
+
+/// Adds to a report what was done after all repairs.
+pub(crate) fn add_last(report: &mut Report, name: RepairName, count: u64, note: String) {
+    report.repairs.push(Repair { name, count, note, seconds: 0.0 });
 }
 
 /// Says of a result that is not good what would make it so.

@@ -7,13 +7,17 @@
 
 mod carried;
 mod clock;
+mod copying;
 mod edited_mesh;
 pub(crate) mod entry;
 mod everywhere;
+mod features;
 pub(crate) mod files;
 pub(crate) mod formats;
 mod judging;
+mod making;
 pub(crate) mod memory;
+pub(crate) mod memory_making;
 pub(crate) mod mesh;
 mod nameless_stl;
 pub mod operations;

@@ -12,10 +12,11 @@ use crate::contract::report::{Outcome, Report, Task};
 use crate::contract::settings::Limits;
 use crate::engine::carried;
 use crate::engine::clock::Clock;
+use crate::engine::copying;
 use crate::engine::formats::{self, Target, Whole};
 use crate::engine::together::{Section, certify, together};
 use crate::engine::work::Work;
-use crate::engine::{files, judging, nameless_stl};
+use crate::engine::{files, judging, making, nameless_stl};
 use crate::io::read::{HEADER_BYTES, MeshFile, PREFIX_BYTES, Part};
 use crate::io::record::{self, Record};
 use crate::io::rows::Said;
@@ -73,12 +74,12 @@ pub(crate) fn repair(
     }
     let (made, parts, _held) = results.finish(mesh, work)?;
     let written = match target.layout {
-        _ if is_copy => formats::copy(input, output, limits, progress)?,
+        _ if is_copy => copying::copy(input, output, limits, progress)?,
         Some(layout) => {
             let whole = Whole { made: &made, title: mesh.title(), parts: &parts, input };
             formats::encode(&whole, output, layout, work, clock)?
         }
-        None => formats::copy(made.path(), output, limits, progress)?,
+        None => copying::copy(made.path(), output, limits, progress)?,
     };
     mesh.check_unchanged()?;
     report.output = Some(files::facts(&written, files::hash(&written, limits, progress)));
@@ -111,10 +112,10 @@ fn is_written(mesh: &MeshFile, is_copy: bool, differ: bool, report: &mut Report,
 
 /// Repairs one mesh, and appends what came of it.
 fn mend(mesh: &MeshFile, part: &Part, results: &mut Results, work: Work<'_>, clock: &mut Clock) -> Result<Report> {
-    let Work { profile, limits, progress } = work;
+    let Work { limits, progress, .. } = work;
     let (own, _held) = spooled(mesh, part, work)?;
     let spool = Nameless::new(limits)?;
-    let made = files::make(own, &spool.path(), true, (profile, limits), progress, clock)?;
+    let made = making::make(own, &spool.path(), true, work, clock)?;
     if made.report.output.is_some() {
         let result = files::open(&spool.path(), limits, progress)?;
         results.differ |= result.records() != made.mesh.as_it_came();

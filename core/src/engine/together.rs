@@ -4,8 +4,8 @@
 //! or a figure that has a limit is the worst of all.
 
 use crate::contract::report::{
-    BoundaryLoops, Certificate, Defects, EditSummary, Faithful, MOST_LISTED, ObjectReport, Outcome, Regions, Repair, Report,
-    RuleOutcome, SelfIntersections, Skin, SkinChange, ThinWalls, Verdict, Volumes,
+    BoundaryLoops, Certificate, Defects, EditSummary, Faithful, Features, MOST_LISTED, ObjectReport, Outcome, Regions, Repair,
+    Report, RuleOutcome, SelfIntersections, Skin, SkinChange, ThinWalls, Verdict, Volumes,
 };
 
 /// A part of a package, as errors and reports name it.
@@ -104,6 +104,7 @@ fn join(all: &mut Report, section: &Section) {
         }
     }
     merge(&mut all.thin_walls, &report.thin_walls, thin_walls);
+    merge(&mut all.features, &report.features, features);
     for stage in &report.stages {
         match all.stages.iter_mut().find(|there| there.name == stage.name) {
             Some(there) => there.seconds += stage.seconds,
@@ -311,6 +312,15 @@ fn faithful(all: &mut Faithful, other: &Faithful) {
             (a, b) => a.or(b),
         };
     }
+}
+
+fn features(all: &mut Features, other: &Features) {
+    all.removed += other.removed;
+    all.left += other.left;
+    all.triangles_gone += other.triangles_gone;
+    all.triangles_added += other.triangles_added;
+    all.why_not = all.why_not.take().or_else(|| other.why_not.clone());
+    append(&mut all.listed, &other.listed);
 }
 
 fn thin_walls(all: &mut ThinWalls, other: &ThinWalls) {

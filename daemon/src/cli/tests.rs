@@ -1,3 +1,4 @@
+use super::meshes::PROFILE_HELP;
 use super::*;
 use clap::CommandFactory;
 

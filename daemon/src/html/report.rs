@@ -181,6 +181,7 @@ fn places(report: &Report) -> Markup {
     let regions = &report.regions;
     html! {
         (thin_walls(report))
+        (features(report))
         @if !report.loops_left.is_empty() {
             h2 { "Left open" }
             table {
@@ -214,6 +215,24 @@ fn thin_walls(report: &Report) -> Markup {
             tbody { @for place in &walls.places { tr {
                 td { (show_point(&place.at)) } td class="n" { (show_number(place.thickness)) } td class="n" { (show_number(walls.minimum)) }
             } } }
+        }
+    }
+}
+
+fn features(report: &Report) -> Markup {
+    let Some(features) = report.features.as_ref() else { return html! {} };
+    html! {
+        h2 { "Features" }
+        p { (show_count(features.removed)) " removed, " (show_count(features.left)) " left: " (show_count(features.triangles_gone)) " triangles gone, "
+            (show_count(features.triangles_added)) " added." @if let Some(reason) = &features.why_not { " " (plain(reason)) "." } }
+        @if !features.listed.is_empty() {
+            table {
+                thead { tr { th scope="col" { "Feature" } th scope="col" { "At" } th scope="col" class="n" { "size" } th scope="col" class="n" { "confidence" } th scope="col" { "Fate" } } }
+                tbody { @for feature in features.listed.iter().take(MOST_ROWS) { tr {
+                    td { (feature.kind.replace('-', " ")) } td { (show_point(&feature.centre.map(|x| x as f32))) } td class="n" { (show_number(feature.size)) }
+                    td class="n" { (show_number(feature.confidence)) } td { @match &feature.left { Some(reason) => { "left: " (plain(reason)) }, None => "removed" } }
+                } } }
+            }
         }
     }
 }

@@ -13,6 +13,7 @@ use super::units::{self, UnitOf};
 use crate::contract::error::{Error, Result};
 use crate::engine::clock::Clock;
 use crate::engine::files::{self, Made};
+use crate::engine::making;
 use crate::engine::together::Section;
 use crate::engine::work::Work;
 use crate::io::read::slicer::{self, Config};
@@ -112,10 +113,10 @@ impl<'a> Maker<'a> {
     }
 
     fn mend(&self, unit: &UnitOf, read: &MeshRecords, sections: &mut Vec<Section>, clock: &mut Clock) -> Result<Mended> {
-        let Work { profile, limits, progress } = self.work;
+        let Work { limits, progress, .. } = self.work;
         let (mesh, _held) = units::spooled(self.package, unit, read, self.work)?;
         let spool = Nameless::new(limits)?;
-        let made = files::make(mesh, &spool.path(), true, (profile, limits), progress, clock)?;
+        let made = making::make(mesh, &spool.path(), true, self.work, clock)?;
         sections.push(section(self.package, unit, made.report.clone(), &read.parsed.findings));
         let result = if made.report.output.is_some() { Some(files::open(&spool.path(), limits, progress)?) } else { None };
         Ok(Mended { made, result, _spool: spool })

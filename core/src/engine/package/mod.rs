@@ -15,10 +15,11 @@ mod units;
 use std::path::Path;
 
 use crate::contract::error::{Error, Result};
-use crate::contract::report::{FileFacts, Format, Outcome, Report, Task};
+use crate::contract::report::{Certificate, FileFacts, Format, Outcome, Report, Task};
 use crate::contract::settings::{OutputFormat, Profile, folder_of};
 use crate::engine::carried;
 use crate::engine::clock::Clock;
+use crate::engine::copying;
 use crate::engine::files;
 use crate::engine::formats;
 use crate::engine::together::{certify, together};
@@ -96,7 +97,8 @@ fn judge_built(report: &mut Report, output: &Path, work: Work<'_>, clock: &mut C
     let built = files::open(output, work.limits, work.progress)?;
     let judged = files::look(&built, (work.profile, work.limits), work.progress, clock)?;
     report.after = Some(judged.before);
-    report.certificate = judged.certificate;
+    let faithful = report.certificate.take().and_then(|certificate| certificate.faithful);
+    report.certificate = judged.certificate.map(|certificate| Certificate { faithful, ..certificate });
     if judged.verdict.good {
         if report.outcome == Outcome::Clean {
             // Good as it came, and yet other bytes.
@@ -134,7 +136,7 @@ pub(crate) fn repair(package: &PackageFile, output: &Path, work: Work<'_>, clock
     let is_written = judge(package, &changed, &mut report, work.profile);
     if is_written {
         if changed.is_none() {
-            formats::copy(package.path(), output, work.limits, work.progress)?;
+            copying::copy(package.path(), output, work.limits, work.progress)?;
         } else {
             changed.write(package, output, work)?;
         }

@@ -1,0 +1,87 @@
+//! Channels: depressions that reach the edges of their faces.
+//!
+//! Faces that meet in concave or smooth edges hang together; what they form is bounded by convex edges (the attributed
+//! adjacency graph of Joshi and Chang, Computer-Aided Design 20, 1988). A channel has two walls that face each other, and is
+//! nowhere wider than between them.
+
+use super::super::feature::{Kind, Limits};
+use super::super::mesh::Mesh;
+use super::super::segments::{Segment, Segments};
+use super::super::surface::Surface;
+use super::super::vector::{Point, cross, dot, mean, scale, sub};
+use super::patch::{Candidate, confidence, extent};
+use super::sets::Sets;
+use crate::defeature::loops::loops;
+
+/// Cosine of 6°: faces that meet in less are smooth.
+const COS_SMOOTH: f64 = 0.9945;
+/// Segments of a channel.
+const MOST_SEGMENTS: usize = 400;
+
+/// Channels narrower than the limit. O(n log n).
+pub(super) fn find(mesh: &Mesh, segments: &Segments, limits: &Limits) -> Vec<Candidate> {
+    let mut sets = Sets::new(segments.list.len());
+    for half in 0..mesh.twin.len() as u32 {
+        let (a, b) = (segments.of[(half / 3) as usize], segments.of[mesh.across(half) as usize]);
+        if a < b && !is_convex(mesh, segments, half) {
+            sets.join(a, b);
+        }
+    }
+    let groups = sets.groups(|_| true);
+    groups
+        .into_iter()
+        .filter(|g| g.len() > 1 && g.len() <= MOST_SEGMENTS)
+        .filter_map(|g| channel(mesh, segments, &g, limits))
+        .collect()
+}
+
+/// Whether the segments at a half-edge meet in a ridge.
+pub(super) fn is_convex(mesh: &Mesh, segments: &Segments, half: u32) -> bool {
+    let (a, b) = (mesh.at(mesh.from(half)), mesh.at(mesh.to(half)));
+    let middle = mean(&[a, b]);
+    let (n, m) = (segments.get(half / 3).1.outward(middle), segments.get(mesh.across(half)).1.outward(middle));
+    dot(n, m) < COS_SMOOTH && dot(cross(n, m), sub(b, a)) > 0.0
+}
+
+fn channel(mesh: &Mesh, segments: &Segments, group: &[u32], limits: &Limits) -> Option<Candidate> {
+    let limit = limits.grooves_below?;
+    let parts: Vec<&Segment> = group.iter().map(|s| &segments.list[*s as usize]).collect();
+    let walls: Vec<(&Segment, Point, Point)> = parts
+        .iter()
+        .filter(|s| s.surface.is_plane())
+        .filter_map(|s| s.triangles.first().map(|t| (*s, s.outward(mesh.centroid(*t)), mesh.centroid(*t))))
+        .collect();
+    // The two walls with the largest area that face each other.
+    let mut best: Option<(f64, Point, f64)> = None;
+    for (k, (one, n, p)) in walls.iter().enumerate() {
+        for (other, m, q) in walls.iter().skip(k + 1) {
+            let gap = dot(sub(*q, *p), *n);
+            let area = one.area.min(other.area);
+            if dot(*n, *m) < -0.9998 && gap > 0.0 && gap < limit && best.is_none_or(|(least, ..)| area > least) {
+                best = Some((area, *n, gap));
+            }
+        }
+    }
+    let (_, normal, gap) = best?;
+    let mut triangles: Vec<u32> = parts.iter().flat_map(|s| s.triangles.iter().copied()).collect();
+    triangles.sort_unstable();
+    let heights = triangles.iter().flat_map(|t| mesh.triangles[*t as usize]).map(|v| dot(normal, mesh.at(v)));
+    let (low, high) = heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)));
+    if high - low > gap + 16.0 * mesh.flatness() {
+        return None;
+    }
+    let rims = loops(mesh, &triangles, |t| triangles.binary_search(&t).is_ok());
+    let is_ring = parts.iter().any(|s| matches!(s.surface, Surface::Cylinder { axis, .. } if dot(axis, normal).abs() > 0.999));
+    let kind = if is_ring && rims.len() == 2 { Kind::RingGroove } else { Kind::Groove };
+    let points: Vec<Point> = triangles.iter().map(|t| mesh.centroid(*t)).collect();
+    let sum = triangles.iter().fold([0.0; 3], |sum: Point, t| {
+        let n = mesh.normals[*t as usize];
+        [0, 1, 2].map(|k| sum[k] + mesh.areas[*t as usize] * n[k])
+    });
+    let across = sub(sum, scale(normal, dot(sum, normal)));
+    let axis = if kind == Kind::RingGroove { normal } else { super::patch::direction(across) };
+    let (centre, length) = (mean(&points), extent(mesh, &triangles));
+    let confidence = confidence(mesh, segments, group);
+    let depth = parts.iter().map(|s| s.area).fold(0.0, f64::max) / length.max(1e-300);
+    Some(Candidate { kind, centre, axis, size: gap, length, depth, confidence, triangles, loops: rims, strips: Vec::new() })
+}

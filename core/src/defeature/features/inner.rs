@@ -1,0 +1,93 @@
+//! Patches behind inner loops: what stands on, or is sunk into, the middle of a face.
+//!
+//! The mesh is cut along all inner loops of flat, cylindrical and conical faces. A piece that has no inner loops of its own
+//! lies on its carriers like a boss, or leads through the part like a hole.
+
+use super::super::loops::loops;
+use super::super::mesh::Mesh;
+use super::super::segments::{Segment, Segments};
+use super::super::surface::Surface;
+use super::super::vector::{Point, add, cross, distance, dot, frame, sub};
+use super::channels::is_convex;
+use super::measure::rim;
+use super::sets::Sets;
+
+/// A face with a hole has six triangles at least.
+const LEAST_TRIANGLES: usize = 6;
+
+/// The pieces without inner loops of their own, each as rising numbers of triangles. O(n log n).
+pub(super) fn pieces(mesh: &Mesh, segments: &Segments, widest: Option<f64>) -> Vec<Vec<u32>> {
+    let mut is_cut = vec![false; mesh.triangles.len() * 3];
+    let mut cuts = Vec::new();
+    for (number, segment) in segments.list.iter().enumerate() {
+        if segment.triangles.len() < LEAST_TRIANGLES || matches!(segment.surface, Surface::Sphere { .. } | Surface::Torus { .. })
+        {
+            continue;
+        }
+        let rims = loops(mesh, &segment.triangles, |t| segments.of[t as usize] == number as u32);
+        if rims.len() < 2 || is_ledge(mesh, segments, &rims, widest) {
+            continue;
+        }
+        for rim in rims.into_iter().filter(|rim| is_inner(mesh, segment, rim)) {
+            for half in &rim {
+                is_cut[*half as usize] = true;
+                is_cut[mesh.twin[*half as usize] as usize] = true;
+            }
+            cuts.extend(rim.first().copied());
+        }
+    }
+    if cuts.is_empty() {
+        return Vec::new();
+    }
+    let mut sets = Sets::new(mesh.triangles.len());
+    for half in (0..is_cut.len() as u32).filter(|half| !is_cut[*half as usize]) {
+        sets.join(half / 3, mesh.across(half));
+    }
+    let mut is_carrier = vec![false; mesh.triangles.len()];
+    let mut is_feature = vec![false; mesh.triangles.len()];
+    for half in &cuts {
+        is_carrier[sets.root(half / 3) as usize] = true;
+        is_feature[sets.root(mesh.across(*half)) as usize] = true;
+    }
+    sets.groups(|root| is_feature[root as usize] && !is_carrier[root as usize])
+}
+
+/// Whether a face is the step of a counterbored hole: a ring between two circles around one axis, the outer one a valley no
+/// wider than holes that are to go, the inner one a ridge.
+fn is_ledge(mesh: &Mesh, segments: &Segments, rims: &[Vec<u32>], widest: Option<f64>) -> bool {
+    let ([one, other], Some(widest)) = (rims, widest) else { return false };
+    let circle = |halves: &Vec<u32>| {
+        let points: Vec<Point> = halves.iter().map(|half| mesh.at(mesh.from(*half))).collect();
+        let found = rim(&points);
+        found.diameter.map(|d| (d, found.centre, halves.iter().all(|half| is_convex(mesh, segments, *half))))
+    };
+    let (Some(a), Some(b)) = (circle(one), circle(other)) else { return false };
+    let ((wide, centre, is_ridge), (narrow, place, is_step)) = if a.0 > b.0 { (a, b) } else { (b, a) };
+    wide < widest && !is_ridge && is_step && distance(centre, place) < 0.05 * narrow
+}
+
+/// Whether a loop bounds its face from within: it turns the other way, and not around a cylinder.
+fn is_inner(mesh: &Mesh, segment: &Segment, rim: &[u32]) -> bool {
+    let points: Vec<Point> = rim.iter().map(|half| mesh.at(mesh.from(*half))).collect();
+    let pairs = || points.iter().zip(points.iter().cycle().skip(1));
+    let Some((origin, axis)) = segment.surface.axis() else {
+        let start = points.first().copied().unwrap_or([0.0; 3]);
+        let area = pairs().fold([0.0; 3], |sum, (a, b)| add(sum, cross(sub(*a, start), sub(*b, start))));
+        return dot(area, segment.outward(start)) < 0.0;
+    };
+    let [e, f] = frame(axis);
+    let polar = |p: &Point| {
+        let d = sub(*p, origin);
+        (dot(d, f).atan2(dot(d, e)), dot(d, axis))
+    };
+    let (mut turn, mut area) = (0.0, 0.0);
+    for (a, b) in pairs() {
+        let ((s, h), (t, k)) = (polar(a), polar(b));
+        let step = (t - s + std::f64::consts::PI).rem_euclid(std::f64::consts::TAU) - std::f64::consts::PI;
+        // −∮ h dθ is the area, seen from outside.
+        area -= step * (h + k) / 2.0;
+        turn += step;
+    }
+    // A cone that opens along its axis is seen from outside as a cylinder is.
+    turn.abs() < 1.0 && if segment.is_concave { area > 0.0 } else { area < 0.0 }
+}

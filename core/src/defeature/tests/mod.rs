@@ -1,0 +1,168 @@
+//! Parts made here, without and with a feature.
+
+mod parts;
+
+use super::feature::Kind;
+use super::{Limits, Outcome, Removed, defeature};
+use parts::Part;
+use proptest::prelude::*;
+use std::collections::BTreeMap;
+
+const ALL: Limits =
+    Limits { holes_below: Some(3.0), fillets_below: Some(3.0), grooves_below: Some(3.0), bosses_below: Some(3.0) };
+
+/// Triangles after an edit, as positions.
+fn apply(part: &Part, edit: &Removed) -> Vec<[[f32; 3]; 3]> {
+    let is_kept = |t: &usize| edit.removed_triangles.binary_search(&(*t as u32)).is_err();
+    let kept = (0..part.triangles.len()).filter(is_kept).map(|t| part.triangles[t].map(|v| part.points[v as usize]));
+    kept.chain(edit.added.iter().copied()).collect()
+}
+
+fn volume(triangles: &[[[f32; 3]; 3]]) -> f64 {
+    let six = |t: &[[f32; 3]; 3]| {
+        let [[a, b, c], [d, e, f], [g, h, i]] = t.map(|p| p.map(f64::from));
+        a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g)
+    };
+    triangles.iter().map(six).sum::<f64>() / 6.0
+}
+
+/// Each directed edge once, and its opposite too.
+fn is_closed(triangles: &[[[f32; 3]; 3]]) -> bool {
+    let key = |p: [f32; 3]| p.map(|x| (x + 0.0).to_bits());
+    let mut edges: BTreeMap<([u32; 3], [u32; 3]), u32> = BTreeMap::new();
+    for t in triangles {
+        (0..3).for_each(|k| *edges.entry((key(t[k]), key(t[(k + 1) % 3]))).or_default() += 1);
+    }
+    edges.iter().all(|((a, b), n)| *n == 1 && edges.get(&(*b, *a)) == Some(&1))
+}
+
+/// One feature of a kind and size is found and removed; what is left is closed and has the volume of the bare part.
+fn check(part: &Part, kind: Kind, size: f64, volume_left: f64) {
+    let edit = defeature(&part.points, &part.triangles, &ALL).unwrap();
+    let found: Vec<_> = edit.features.iter().map(|f| (f.kind, f.outcome)).collect();
+    assert_eq!(found, [(kind, Outcome::Removed)]);
+    assert!((edit.features[0].size - size).abs() < 1e-3 * size, "{}", edit.features[0].size);
+    assert!(edit.features[0].confidence > 0.5);
+    let left = apply(part, &edit);
+    assert!(is_closed(&left));
+    assert!((volume(&left) / volume_left - 1.0).abs() < 1e-6, "{} {volume_left}", volume(&left));
+}
+
+#[test]
+fn a_bare_box_has_no_features() {
+    let part = parts::plate([30.0, 20.0, 5.0], &[]);
+    assert_eq!(defeature(&part.points, &part.triangles, &ALL).unwrap(), Removed::default());
+}
+
+#[test]
+fn a_through_hole_is_filled_on_both_sides() {
+    // 8 sides are the least for a circle.
+    for sides in [8, 16, 200] {
+        let part = parts::plate([30.0, 20.0, 5.0], &[parts::circle([12.0, 9.0], 1.0, sides)]);
+        check(&part, Kind::ThroughHole, 2.0, 3000.0);
+    }
+}
+
+#[test]
+fn a_hole_of_the_limit_stays() {
+    let part = parts::plate([30.0, 20.0, 5.0], &[parts::circle([12.0, 9.0], 1.6, 32)]);
+    assert_eq!(defeature(&part.points, &part.triangles, &ALL).unwrap(), Removed::default());
+}
+
+#[test]
+fn depressions_and_bosses_leave_their_face_flat() {
+    let part = |outline: &[[f64; 2]], depth: f64| parts::stepped([30.0, 20.0, 5.0], outline, depth);
+    check(&part(&parts::circle([12.0, 9.0], 1.0, 24), -2.0), Kind::BlindHole, 2.0, 3000.0);
+    check(&part(&parts::circle([12.0, 9.0], 1.0, 24), 2.5), Kind::Boss, 2.5, 3000.0);
+    let letter = [[10.0, 5.0], [13.0, 5.0], [13.0, 6.0], [11.0, 6.0], [11.0, 10.0], [10.0, 10.0]];
+    check(&part(&letter, 0.5), Kind::Boss, 0.5, 3000.0);
+    let strip = [[10.0, 5.0], [18.0, 5.0], [18.0, 7.0], [10.0, 7.0]];
+    check(&part(&strip, -0.5), Kind::Slot, 2.0, 3000.0);
+}
+
+#[test]
+fn what_lies_along_an_edge_is_filled_up_to_where_faces_meet() {
+    // The outline of a bar along z: a rectangle of 20 by 10 but for one feature.
+    let bar = |outline: &[[f64; 2]]| parts::bar(outline, 30.0);
+    let groove = [[0.0, 0.0], [20.0, 0.0], [20.0, 10.0], [12.0, 10.0], [12.0, 8.0], [10.0, 8.0], [10.0, 10.0], [0.0, 10.0]];
+    check(&bar(&groove), Kind::Groove, 2.0, 6000.0);
+    let chamfer = [[0.0, 0.0], [20.0, 0.0], [20.0, 9.0], [19.0, 10.0], [0.0, 10.0]];
+    check(&bar(&chamfer), Kind::Chamfer, 2.0_f64.sqrt(), 6000.0);
+    let mut convex = vec![[0.0, 0.0], [20.0, 0.0]];
+    convex.extend(parts::arc([18.0, 8.0], 2.0, [0.0, 90.0], 6));
+    convex.push([0.0, 10.0]);
+    check(&bar(&convex), Kind::Fillet, 2.0, 6000.0);
+    // An L of 20 by 10 with a square of 10 by 5 missing; its inner corner is rounded.
+    let mut concave = vec![[0.0, 0.0], [20.0, 0.0], [20.0, 5.0]];
+    concave.extend(parts::arc([12.0, 7.0], 2.0, [270.0, 180.0], 6));
+    concave.extend([[10.0, 10.0], [0.0, 10.0]]);
+    check(&bar(&concave), Kind::Fillet, 2.0, 4500.0);
+}
+
+#[test]
+fn nested_features_go_from_within() {
+    // A boss of 3 mm with a blind hole of 1 mm in it.
+    let part = parts::tower([30.0, 20.0, 5.0], [12.0, 9.0], [(3.0, 2.0), (1.0, -1.0)]);
+    let edit = defeature(&part.points, &part.triangles, &ALL).unwrap();
+    let kinds: Vec<Kind> = edit.features.iter().map(|f| f.kind).collect();
+    assert_eq!(kinds, [Kind::BlindHole, Kind::Boss]);
+    let left = apply(&part, &edit);
+    assert!(is_closed(&left) && (volume(&left) - 3000.0).abs() < 1e-2);
+}
+
+#[test]
+fn untouched_triangles_stay_in_the_edit_of_a_hole() {
+    let part = parts::plate([30.0, 20.0, 5.0], &[parts::circle([12.0, 9.0], 1.0, 16)]);
+    let edit = defeature(&part.points, &part.triangles, &ALL).unwrap();
+    // The wall of 16 quads goes, and nothing else.
+    assert_eq!(edit.removed_triangles.len(), 32);
+    assert_eq!(edit.removed_triangles, edit.features[0].triangles);
+}
+
+#[test]
+fn many_holes_hold_most_triangles() {
+    let places: Vec<_> =
+        (0..12).map(|k| parts::circle([3.0 + f64::from(k % 4) * 7.0, 4.0 + f64::from(k / 4) * 6.0], 1.0, 24)).collect();
+    let part = parts::plate([30.0, 20.0, 5.0], &places);
+    let edit = defeature(&part.points, &part.triangles, &ALL).unwrap();
+    assert_eq!(edit.features.len(), 12);
+    assert!(is_closed(&apply(&part, &edit)));
+}
+
+#[test]
+fn a_mesh_with_a_rim_is_refused() {
+    let part = parts::plate([3.0, 2.0, 1.0], &[]);
+    assert!(matches!(defeature(&part.points, &part.triangles[1..], &ALL), Err(super::DefeatureError::Open(..))));
+    assert!(matches!(defeature(&part.points, &[[0, 1, 99]], &ALL), Err(super::DefeatureError::Index(0))));
+    assert_eq!(defeature(&[], &[], &ALL).unwrap(), Removed::default());
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(48))]
+
+    /// Wherever a hole is and however the part lies: the result is closed and has the volume of the part without it.
+    #[test]
+    fn holes_anywhere(x in 3.0..27.0, y in 3.0..17.0, r in 0.2..1.4, sides in 8_usize..80, turn in 0.0..6.0, scale in 0.1..10.0) {
+        let mut part = parts::plate([30.0, 20.0, 5.0], &[parts::circle([x, y], r, sides)]);
+        part.turn(turn, scale);
+        let limits = Limits { holes_below: Some(3.0 * scale), ..Limits::default() };
+        let edit = defeature(&part.points, &part.triangles, &limits).unwrap();
+        prop_assert_eq!(edit.features.len(), 1);
+        let left = apply(&part, &edit);
+        prop_assert!(is_closed(&left));
+        prop_assert!((volume(&left) / (3000.0 * scale.powi(3)) - 1.0).abs() < 1e-5);
+    }
+
+    /// Meshes of no part, with vertices moved at random: whatever is done, the result is closed.
+    #[test]
+    fn dented_parts_stay_closed(moves in prop::collection::vec((0_usize..60, -0.4_f32..0.4), 1..20), depth in -3.0..3.0) {
+        let mut part = parts::stepped([30.0, 20.0, 5.0], &parts::circle([12.0, 9.0], 2.0, 16), depth);
+        for (vertex, by) in moves {
+            let count = part.points.len();
+            part.points[vertex % count][vertex % 3] += by;
+        }
+        let edit = defeature(&part.points, &part.triangles, &ALL).unwrap();
+        prop_assert!(is_closed(&apply(&part, &edit)));
+        prop_assert_eq!(edit, defeature(&part.points, &part.triangles, &ALL).unwrap());
+    }
+}

@@ -1,0 +1,146 @@
+//! A small generator of parts.
+
+use spade::handles::FixedVertexHandle;
+use spade::{ConstrainedDelaunayTriangulation, Point2, Triangulation};
+use std::collections::BTreeMap;
+
+type Outline = Vec<[f64; 2]>;
+
+/// An indexed mesh.
+#[derive(Default)]
+pub(super) struct Part {
+    pub(super) points: Vec<[f32; 3]>,
+    pub(super) triangles: Vec<[u32; 3]>,
+    known: BTreeMap<[u32; 3], u32>,
+}
+
+impl Part {
+    fn vertex(&mut self, [x, y, z]: [f64; 3]) -> u32 {
+        let point = [x as f32, y as f32, z as f32];
+        *self.known.entry(point.map(f32::to_bits)).or_insert_with(|| {
+            self.points.push(point);
+            self.points.len() as u32 - 1
+        })
+    }
+
+    fn triangle(&mut self, corners: [[f64; 3]; 3]) {
+        let triangle = corners.map(|p| self.vertex(p));
+        self.triangles.push(triangle);
+    }
+
+    /// A flat face at a height, between outlines that have it on their left; turned over where it looks down.
+    fn face(&mut self, outlines: &[Outline], z: f64, is_up: bool) {
+        for [a, b, c] in fill(outlines) {
+            let corners = if is_up { [a, b, c] } else { [a, c, b] };
+            self.triangle(corners.map(|[x, y]| [x, y, z]));
+        }
+    }
+
+    /// Walls over outlines that have the material on their left, from one height up to another.
+    fn wall(&mut self, outline: &Outline, low: f64, high: f64) {
+        for (k, [x, y]) in outline.iter().copied().enumerate() {
+            let [u, v] = outline[(k + 1) % outline.len()];
+            self.triangle([[x, y, low], [u, v, low], [u, v, high]]);
+            self.triangle([[x, y, low], [u, v, high], [x, y, high]]);
+        }
+    }
+
+    /// Turns the part around an oblique axis and scales it.
+    pub(super) fn turn(&mut self, angle: f64, scale: f64) {
+        for point in &mut self.points {
+            let [x, y, z] = point.map(f64::from);
+            let (c, s) = (angle.cos(), angle.sin());
+            let (x, y) = (c * x - s * y, s * x + c * y);
+            let (y, z) = (0.8 * y - 0.6 * z, 0.6 * y + 0.8 * z);
+            *point = [x, y, z].map(|w| (w * scale) as f32);
+        }
+    }
+}
+
+pub(super) fn circle([x, y]: [f64; 2], radius: f64, sides: usize) -> Outline {
+    let angle = |k: usize| std::f64::consts::TAU * k as f64 / sides as f64;
+    (0..sides).map(|k| [x + radius * angle(k).cos(), y + radius * angle(k).sin()]).collect()
+}
+
+/// Points from one angle to another, both ends among them, degrees.
+pub(super) fn arc([x, y]: [f64; 2], radius: f64, [from, to]: [f64; 2], steps: usize) -> Outline {
+    let angle = |k: usize| (from + (to - from) * k as f64 / steps as f64).to_radians();
+    (0..=steps).map(|k| [x + radius * angle(k).cos(), y + radius * angle(k).sin()]).collect()
+}
+
+fn rectangle([x, y]: [f64; 2]) -> Outline {
+    vec![[0.0, 0.0], [x, 0.0], [x, y], [0.0, y]]
+}
+
+fn reversed(outline: &[[f64; 2]]) -> Outline {
+    outline.iter().rev().copied().collect()
+}
+
+/// A plate with holes through it.
+pub(super) fn plate([x, y, z]: [f64; 3], holes: &[Outline]) -> Part {
+    let mut part = Part::default();
+    let mut outlines = vec![rectangle([x, y])];
+    outlines.extend(holes.iter().map(|hole| reversed(hole)));
+    part.face(&outlines, z, true);
+    part.face(&outlines, 0.0, false);
+    outlines.iter().for_each(|outline| part.wall(outline, 0.0, z));
+    part
+}
+
+/// A plate with a boss (positive) or a pocket on it.
+pub(super) fn stepped([x, y, z]: [f64; 3], outline: &[[f64; 2]], height: f64) -> Part {
+    let mut part = Part::default();
+    part.face(&[rectangle([x, y])], 0.0, false);
+    part.wall(&rectangle([x, y]), 0.0, z);
+    part.face(&[rectangle([x, y]), reversed(outline)], z, true);
+    part.face(&[outline.to_vec()], z + height, true);
+    if height > 0.0 {
+        part.wall(&outline.to_vec(), z, z + height);
+    } else {
+        part.wall(&reversed(outline), z + height, z);
+    }
+    part
+}
+
+/// A plate with a round boss, in it a hole: (diameter, height) of each, that of the hole negative.
+pub(super) fn tower([x, y, z]: [f64; 3], place: [f64; 2], [(wide, up), (narrow, down)]: [(f64, f64); 2]) -> Part {
+    let (boss, hole) = (circle(place, wide / 2.0, 32), circle(place, narrow / 2.0, 16));
+    let mut part = Part::default();
+    part.face(&[rectangle([x, y])], 0.0, false);
+    part.wall(&rectangle([x, y]), 0.0, z);
+    part.face(&[rectangle([x, y]), reversed(&boss)], z, true);
+    part.wall(&boss, z, z + up);
+    part.face(&[boss, reversed(&hole)], z + up, true);
+    part.wall(&reversed(&hole), z + up + down, z + up);
+    part.face(&[hole], z + up + down, true);
+    part
+}
+
+/// A bar of an outline.
+pub(super) fn bar(outline: &[[f64; 2]], length: f64) -> Part {
+    let mut part = Part::default();
+    part.face(&[outline.to_vec()], 0.0, false);
+    part.face(&[outline.to_vec()], length, true);
+    part.wall(&outline.to_vec(), 0.0, length);
+    part
+}
+
+/// Triangles between outlines: those of the constrained triangulation whose middle lies inside by the even-odd rule.
+fn fill(outlines: &[Outline]) -> Vec<[[f64; 2]; 3]> {
+    let mut mesh = ConstrainedDelaunayTriangulation::<Point2<f64>>::new();
+    for outline in outlines {
+        let handles: Vec<FixedVertexHandle> = outline.iter().map(|[x, y]| mesh.insert(Point2::new(*x, *y)).unwrap()).collect();
+        for (k, handle) in handles.iter().enumerate() {
+            mesh.add_constraint(*handle, handles[(k + 1) % handles.len()]);
+        }
+    }
+    let is_inside = |x: f64, y: f64| {
+        let crossings = outlines
+            .iter()
+            .flat_map(|o| o.iter().zip(o.iter().cycle().skip(1)))
+            .filter(|(a, b)| (a[1] <= y) != (b[1] <= y) && x < a[0] + (y - a[1]) / (b[1] - a[1]) * (b[0] - a[0]));
+        crossings.count() % 2 == 1
+    };
+    let corners = mesh.inner_faces().map(|face| face.vertices().map(|v| [v.position().x, v.position().y]));
+    corners.filter(|[a, b, c]| is_inside((a[0] + b[0] + c[0]) / 3.0, (a[1] + b[1] + c[1]) / 3.0)).collect()
+}

@@ -1,0 +1,117 @@
+//! Words of the commands that make other meshes of meshes.
+
+use std::path::PathBuf;
+
+use clap::{ArgGroup, Args};
+
+use suture_core::OutputFormat;
+
+use super::spend::{Guarantee, Spend};
+use crate::units::{parse_format, parse_length};
+
+/// The purpose of each profile.
+pub(super) const PROFILE_HELP: &str = "\
+Profile: a name, or a TOML file of settings [default: default]
+
+default       repairs what can be repaired
+fast          leaves out what takes time and no valid surface needs: the search for
+              self-intersections (the verdict calls them unchecked), the shaping of patches
+strict        small mending only; what changes more, or cannot be proved, is a person's
+cautious      welds and drops what is surplus, closes, cuts and wraps nothing
+scan          larger holes and wider gaps, for scanned surfaces
+inspect-only  repairs nothing: a good file is passed on as it is, of any other nothing
+              is written";
+
+#[derive(Args, Debug)]
+pub(crate) struct RepairArgs {
+    /// Mesh files: STL, 3MF, PLY, OFF, OBJ, AMF
+    #[arg(required = true, value_name = "IN")]
+    pub inputs: Vec<PathBuf>,
+    /// Where to write: a file name, or a folder (needed for several inputs; part.stl, then part~2.stl)
+    #[arg(short, long, value_name = "OUT|DIR")]
+    pub output: PathBuf,
+    /// Format of the result: stl, 3mf, ply, off, obj or amf [default: that of OUT's ending, or else of IN]
+    #[arg(long, value_name = "FORMAT", value_parser = parse_format)]
+    pub format: Option<OutputFormat>,
+    /// Write the full report as JSON to this file (for several inputs: into this folder)
+    #[arg(long, value_name = "FILE")]
+    pub report: Option<PathBuf>,
+    /// Profile: default, fast, strict, cautious, scan, inspect-only, or a TOML file of settings
+    #[arg(long, value_name = "NAME|FILE", default_value = "default", long_help = PROFILE_HELP, hide_default_value = true)]
+    pub profile: String,
+    /// Do not look for self-intersections: faster, but the verdict then calls them unchecked
+    #[arg(long)]
+    pub no_self_intersections: bool,
+    /// What to do with geometry that no repair can turn into a solid [default: the profile's: wrap; strict in strict and cautious]
+    #[arg(long, value_enum)]
+    pub guarantee: Option<Guarantee>,
+    #[command(flatten)]
+    pub spend: Spend,
+    /// Print reports as JSON, one a line, instead of tables
+    #[arg(long)]
+    pub json: bool,
+    /// List every deleted, flipped, moved and added triangle in the report
+    #[arg(long)]
+    pub list_edit: bool,
+    /// Replace the result and the report if they exist, in a folder too (an input is never replaced)
+    #[arg(long)]
+    pub force: bool,
+}
+
+#[derive(Args, Debug)]
+pub(crate) struct InspectArgs {
+    /// Mesh files: STL, 3MF, PLY, OFF, OBJ, AMF
+    #[arg(required = true, value_name = "IN")]
+    pub inputs: Vec<PathBuf>,
+    /// Profile: default, fast, strict, cautious, scan, inspect-only, or a TOML file of settings
+    #[arg(long, value_name = "NAME|FILE", default_value = "default", long_help = PROFILE_HELP, hide_default_value = true)]
+    pub profile: String,
+    /// Do not look for self-intersections: faster, but the verdict then calls them unchecked
+    #[arg(long)]
+    pub no_self_intersections: bool,
+    /// Check the certificate in this report, as written by repair or inspect, against the bytes of IN as they are now
+    #[arg(long, value_name = "REPORT", conflicts_with_all = ["json", "profile", "no_self_intersections"])]
+    pub certificate: Option<PathBuf>,
+    /// Check its second half, too: repair the file that IN was made of anew, and compare
+    #[arg(long, value_name = "FILE", requires = "certificate")]
+    pub original: Option<PathBuf>,
+    #[command(flatten)]
+    pub spend: Spend,
+    /// Print reports as JSON, one a line, instead of tables
+    #[arg(long)]
+    pub json: bool,
+}
+
+#[derive(Args, Debug)]
+pub(crate) struct ConvertArgs {
+    /// A mesh file: STL, 3MF, PLY, OFF, OBJ, AMF
+    #[arg(value_name = "IN")]
+    pub input: PathBuf,
+    /// The file to write; its ending says the format
+    #[arg(value_name = "OUT")]
+    pub output: PathBuf,
+    /// Replace OUT if it exists
+    #[arg(long)]
+    pub force: bool,
+    #[command(flatten)]
+    pub spend: Spend,
+}
+
+#[derive(Args, Debug)]
+#[command(group = ArgGroup::new("limits").multiple(true))]
+pub(crate) struct DefeatureArgs {
+    /// Remove holes of a smaller diameter, through or blind; lengths are in the file's units
+    #[arg(long, value_name = "D", value_parser = parse_length, group = "limits")]
+    pub holes_below: Option<f64>,
+    /// Remove fillets of a smaller radius, and narrower chamfers
+    #[arg(long, value_name = "R", value_parser = parse_length, group = "limits")]
+    pub fillets_below: Option<f64>,
+    /// Remove narrower grooves, slots and pockets, engraved letters among them
+    #[arg(long, value_name = "W", value_parser = parse_length, group = "limits")]
+    pub grooves_below: Option<f64>,
+    /// Remove lower bosses, embossed letters among them
+    #[arg(long, value_name = "H", value_parser = parse_length, group = "limits")]
+    pub bosses_below: Option<f64>,
+    #[command(flatten)]
+    pub repair: RepairArgs,
+}

@@ -89,7 +89,8 @@ fn a_larger_hole_stays_and_the_file_is_copied() {
     let place = Place::new();
     place.put("part.stl", &stl::mesh(&plate(3.0)));
     place.put("small.toml", b"remove_holes_below_mm = 5.0\n");
-    let said = place.repair("part.stl", "out.stl", &["--profile", "small.toml", "--report", "report.json"]).expect(0).stdout();
+    let options = ["repair", "part.stl", "-o", "out.stl", "--profile", "small.toml", "--report", "report.json"];
+    let said = place.suture(options).expect(0).stdout();
     assert!(said.contains("clean") && said.contains("0 removed, 0 left"), "{said}");
     assert_eq!((place.read("out.stl") == place.read("part.stl"), report(&place)["outcome"].as_str()), (true, Some("clean")));
     let refused = place.suture(["defeature", "part.stl", "-o", "b.stl"]).expect(2).stderr();

@@ -184,7 +184,8 @@ fn fill<'py>(
         "flat" => PatchShape::Flat,
         "fair" => PatchShape::Fair,
         "implicit" => PatchShape::Implicit,
-        other => return Err(invalid(format!("a patch is \"flat\", \"fair\" or \"implicit\", not {other:?}"))),
+        "coons" => PatchShape::Coons,
+        other => return Err(invalid(format!("a patch is \"flat\", \"fair\", \"coons\" or \"implicit\", not {other:?}"))),
     };
     let (mesh, limits) = (view(&vertices, &faces)?, limits(memory, threads));
     let how = Fill::default().only_loop(only_loop).shape(shape).max_edges(max_edges).sheets(sheets);

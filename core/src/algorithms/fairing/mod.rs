@@ -9,6 +9,7 @@
 
 mod check;
 mod coarse;
+mod coons;
 mod crease;
 mod fair;
 mod rbf;
@@ -33,6 +34,8 @@ pub(crate) use sheet::{edges, sorted};
 pub(crate) enum Method {
     /// Least change of curvature.
     Fair,
+    /// On the surface that blends the sides of the rim between its corners; of a rim with less than two, as [`Method::Fair`].
+    Coons,
     /// On an implicit surface through the surroundings, which has no creases: where one goes through the patch, as [`Method::Fair`].
     Implicit,
 }
@@ -74,6 +77,11 @@ pub(crate) fn shape(coarse: &CoarsePatch<'_>, settings: &ShapeSettings) -> Resul
         return Err(Unshaped::NothingToAdd);
     }
     let mut sheet = sheet_of(coarse, settings.finer).ok_or(Unshaped::NotASurface)?;
+    if settings.method == Method::Coons
+        && let Ok(shaped) = blended(coarse, settings)
+    {
+        return Ok(shaped);
+    }
     if refine::is_fine(&sheet) {
         return Err(Unshaped::NothingToAdd);
     }
@@ -86,15 +94,7 @@ pub(crate) fn shape(coarse: &CoarsePatch<'_>, settings: &ShapeSettings) -> Resul
         divided = crease::with_edges(coarse, &sheet, &through).ok_or(Unshaped::Creased)?;
         sheet = sheet_of(&CoarsePatch { patch: &divided, ..*coarse }, settings.finer).ok_or(Unshaped::NotASurface)?;
     }
-    let rim = sheet.on_rim.iter().filter(|on| **on).count() as f64;
-    let most = settings.max_vertices.min((50.0 * rim * rim.sqrt()) as usize);
-    let needed = vertices_needed(&sheet);
-    if needed > most as f64 {
-        let coarser = (needed / most as f64).sqrt();
-        for scale in &mut sheet.scale {
-            *scale *= coarser;
-        }
-    }
+    let most = most_vertices(&mut sheet, settings);
     if !through.iter().all(|ends| crease::carry_on(&mut sheet, *ends)) {
         return Err(Unshaped::Creased);
     }
@@ -119,6 +119,31 @@ pub(crate) fn shape(coarse: &CoarsePatch<'_>, settings: &ShapeSettings) -> Resul
         }
     }
     Err(Unshaped::Crosses)
+}
+
+/// The patch between feature curves, whatever the surface around does.
+fn blended(coarse: &CoarsePatch<'_>, settings: &ShapeSettings) -> Result<Shaped, Unshaped> {
+    let mut sheet = sheet_of(coarse, settings.finer).ok_or(Unshaped::NotASurface)?;
+    let most = most_vertices(&mut sheet, settings);
+    if refine(&mut sheet, most) == 0 {
+        return Err(Unshaped::NothingToAdd);
+    }
+    coons::place(&mut sheet)?;
+    finish(&sheet, coarse)
+}
+
+/// How many vertices may be new; longer edges are wanted where it would be more.
+fn most_vertices(sheet: &mut Sheet<'_>, settings: &ShapeSettings) -> usize {
+    let rim = sheet.on_rim.iter().filter(|on| **on).count() as f64;
+    let most = settings.max_vertices.min((50.0 * rim * rim.sqrt()) as usize);
+    let needed = vertices_needed(sheet);
+    if needed > most as f64 {
+        let coarser = (needed / most as f64).sqrt();
+        for scale in &mut sheet.scale {
+            *scale *= coarser;
+        }
+    }
+    most
 }
 
 fn sheet_of<'a>(coarse: &CoarsePatch<'a>, finer: f64) -> Option<Sheet<'a>> {

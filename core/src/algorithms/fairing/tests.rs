@@ -7,6 +7,8 @@ use super::sheet::edges;
 use super::*;
 use crate::algorithms::triangulate::{FillSettings, Rim, triangulate};
 
+mod coons;
+
 /// A surface that is known everywhere.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Surface {

@@ -10,7 +10,7 @@ use std::collections::HashMap;
 use glam::DVec3;
 
 use crate::algorithms::extend;
-use crate::algorithms::fairing::{self, CoarsePatch, ShapeSettings, Shaped, Unshaped, edges, sorted};
+use crate::algorithms::fairing::{self, CoarsePatch, Method, ShapeSettings, Shaped, Unshaped, edges, sorted};
 use crate::contract::report::RepairName;
 use crate::geometry::exact::{Point, at};
 use crate::geometry::position::{self, Position};
@@ -41,7 +41,7 @@ pub(crate) fn smooth(
     threads: usize,
 ) {
     let submesh: &Submesh = work;
-    let wanted = parallel::map(threads, numbers.len(), |k| is_wanted(submesh, &placed[numbers[k]], settings.finer));
+    let wanted = parallel::map(threads, numbers.len(), |k| is_wanted(submesh, &placed[numbers[k]], settings));
     let roomy: Vec<usize> = numbers.iter().zip(wanted).filter(|(_, wanted)| *wanted).map(|(i, _)| *i).collect();
     let mut rest = roomy.as_slice();
     while !rest.is_empty() {
@@ -60,7 +60,7 @@ pub(crate) fn smooth(
         let beyond = Beyond::of(survey, submesh, batch.iter().map(|i| &placed[*i]));
         let shaped = parallel::map(threads, batch.len(), |i| {
             let region = Gathered::of(submesh, &beyond, &placed[batch[i]]);
-            if region.is_cut() {
+            if settings.method != Method::Coons && region.is_cut() {
                 return Err(Unshaped::Cut);
             }
             let shaped = fairing::shape(
@@ -84,12 +84,13 @@ const FEWEST_CUT: usize = 8;
 const ALIKE: f64 = 0.5;
 
 /// Is a patch to be shaped, as far as the triangles of the submesh tell?
-fn is_wanted(submesh: &Submesh, patch: &Placed, finer: f64) -> bool {
+fn is_wanted(submesh: &Submesh, patch: &Placed, ShapeSettings { method, finer, .. }: &ShapeSettings) -> bool {
+    let (finer, may_be_edge) = (*finer, *method == Method::Coons);
     // One triangle has no inner edge, and planes are as they should be.
     (patch.count > 1 || patch.count == 1 && finer > 1.0) && patch.method != EXTENDED && {
         let edges = Edges::of(submesh, patch);
         (finer > 1.0 || edges.have_room(submesh))
-            && !edges.is_rim_an_edge(submesh, patch)
+            && (may_be_edge || !edges.is_rim_an_edge(submesh, patch))
             && !edges.lie_in_a_plane(submesh, patch)
     }
 }

@@ -192,6 +192,7 @@ fn shape_settings(profile: &Profile) -> Option<ShapeSettings> {
     let method = match profile.patch_shape {
         PatchShape::Flat => return None,
         PatchShape::Fair => Method::Fair,
+        PatchShape::Coons => Method::Coons,
         PatchShape::Implicit => Method::Implicit,
     };
     Some(ShapeSettings { method, ..ShapeSettings::default() })

@@ -49,6 +49,7 @@ pub use contract::settings::{
 pub use contract::{error, report, settings};
 pub use detect::fidelity::{FIDELITY_RULES, FidelityRule};
 pub use detect::rules::{RULES, Rule};
+pub use engine::curve_mesh::CurveMesh;
 pub use engine::memory::RepairedMesh;
 pub use engine::mesh::{Mesh, MeshError, MeshView};
 pub use engine::operations;
@@ -78,6 +79,23 @@ pub fn inspect(input: &Path, profile: &Profile, limits: &Limits, progress: &dyn 
 /// [`Error`]; what then stands at `output` is incomplete and to be removed.
 pub fn repair(input: &Path, output: &Path, profile: &Profile, limits: &Limits, progress: &dyn Progress) -> error::Result<Report> {
     engine::entry::repair(input, output, profile, limits, progress)
+}
+
+/// Writes the mesh of outlines of curves that were filled (`curves::fill`) to the new file `output`, in this format and in millimetres, of which there are so many in
+/// the unit of the curves; `name` is what errors call it. An outline that no surface fits is closed as a hole of a mesh is, where that is possible. The file is
+/// read back and judged.
+///
+/// O(n log n) in its triangles, which are in memory.
+///
+/// # Errors
+/// [`Error`]; what then stands at `output` is incomplete and to be removed.
+pub fn write_curve_mesh(
+    (name, filled, millimetres): (&Path, &curves::fill::Filled, f64),
+    (output, format): (&Path, OutputFormat),
+    limits: &Limits,
+    progress: &dyn Progress,
+) -> error::Result<CurveMesh> {
+    engine::curve_mesh::write((name, filled, millimetres), (output, format), limits, progress)
 }
 
 /// Writes the triangles of the file `input` to the new file `output` in this format, and changes nothing of them; the written file is read back and

@@ -10,7 +10,7 @@ use suture_store::Priority;
 use suture_store::job::Kind;
 
 use crate::units::{parse_duration, parse_listen, parse_size};
-use meshes::{ConvertArgs, DefeatureArgs, InspectArgs, RepairArgs};
+use meshes::{ConvertArgs, DefeatureArgs, FillCurvesArgs, InspectArgs, RepairArgs};
 use service::{CompletionsArgs, CurvesArgs, ManArgs, NightArgs, StatusArgs, StoreArgs, TopArgs};
 use spend::Spend;
 
@@ -60,6 +60,8 @@ pub(crate) enum Command {
     Convert(ConvertArgs),
     /// Say which curves are in IGES, STEP or JSON files, and which closed loops they form
     Curves(CurvesArgs),
+    /// Fill the closed loops of curves, or faces that lost their surfaces: a mesh, or surfaces for CAD programs
+    FillCurves(FillCurvesArgs),
     /// Serve a hot folder: repair whatever is dropped into DIR/in
     #[command(long_about = WATCH_HELP)]
     Watch(WatchArgs),

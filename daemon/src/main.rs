@@ -28,6 +28,7 @@ mod event_metrics;
 mod event_store;
 mod exit;
 mod fence;
+mod fill_curves;
 mod folder;
 mod force;
 mod fsx;
@@ -118,6 +119,7 @@ fn main() -> ExitCode {
         Command::Inspect(args) => single::inspect(args),
         Command::Convert(args) => convert::run(args),
         Command::Curves(args) => curves::run(args),
+        Command::FillCurves(args) => fill_curves::run(args),
         Command::Worker(args) => match worker::serve(args) {
             Ok(()) => Exit::Good,
             Err(error) => {

@@ -12,6 +12,7 @@ mod e2e {
     mod curves;
     mod features;
     mod files;
+    mod fill_curves;
     mod formats;
     mod heard;
     mod hostile;

@@ -9,6 +9,7 @@ mod carrier;
 mod collect;
 pub mod curve;
 pub mod export;
+pub mod fill;
 mod finding;
 mod iges;
 mod json;

@@ -8,6 +8,7 @@
 mod carried;
 mod clock;
 mod copying;
+pub(crate) mod curve_mesh;
 mod edited_mesh;
 pub(crate) mod entry;
 mod everywhere;

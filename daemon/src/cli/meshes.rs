@@ -115,3 +115,39 @@ pub(crate) struct DefeatureArgs {
     #[command(flatten)]
     pub repair: RepairArgs,
 }
+
+#[derive(Args, Debug)]
+pub(crate) struct FillCurvesArgs {
+    /// File of curves: IGES, STEP, or JSON of knots and control points
+    #[arg(value_name = "CURVES")]
+    pub input: PathBuf,
+    /// Where to write: a mesh (stl, 3mf, ply, off, obj, amf; in millimetres), or surfaces (igs, step), by its ending
+    #[arg(short, long, value_name = "OUT")]
+    pub output: PathBuf,
+    /// Fill the loops that the curves form, even if the file says which curves bound its faces
+    #[arg(long)]
+    pub loops: bool,
+    /// Close open ends by straight curves, the nearest two first, none longer than this; lengths are in the unit of the file
+    #[arg(long, value_name = "LENGTH", value_parser = parse_length)]
+    pub close_gaps: Option<f64>,
+    /// How far fitted curves may be from their own [default: 5e-7 of the length of each]
+    #[arg(long, value_name = "LENGTH", value_parser = parse_length)]
+    pub tolerance: Option<f64>,
+    /// How far edges of the mesh may be from curves and surfaces [default: 1/500 of each outline]
+    #[arg(long, value_name = "LENGTH", value_parser = parse_length)]
+    pub chord: Option<f64>,
+    /// How much curves may turn along an edge of the mesh, in degrees [default: 20]
+    #[arg(long, value_name = "DEGREES", value_parser = parse_length)]
+    pub angle: Option<f64>,
+    /// The longest edge of the mesh [default: by the curves]
+    #[arg(long, value_name = "LENGTH", value_parser = parse_length)]
+    pub edge: Option<f64>,
+    #[command(flatten)]
+    pub spend: Spend,
+    /// Print JSON instead of a table: each outline, and the report of the mesh
+    #[arg(long)]
+    pub json: bool,
+    /// Replace the result if it exists (the input is never replaced)
+    #[arg(long)]
+    pub force: bool,
+}

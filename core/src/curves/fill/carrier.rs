@@ -1,0 +1,187 @@
+//! Surfaces that CAD works with, recognised by outlines alone.
+//!
+//! Axes are those of the outline's circles, or the directions of its straight lines; with an axis, a surface of revolution is a
+//! curve of distances and heights, on which all points of the outline have to be.
+
+use super::space::{self, Frame};
+use super::strand::Kind;
+use crate::curves::vector::{Point, cross, distance, norm, scale, sub, unit};
+
+/// A surface of an equation, without bounds.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Carrier {
+    /// `z = 0` of a frame.
+    Plane(Frame),
+    /// Around the z-axis of a frame.
+    Cylinder {
+        /// Its origin is on the axis.
+        frame: Frame,
+        /// Of the circle.
+        radius: f64,
+    },
+    /// Around the z-axis of a frame, its apex the origin, the surface above it.
+    Cone {
+        /// The apex and the axis.
+        frame: Frame,
+        /// Distance from the axis at the height 1.
+        slope: f64,
+    },
+    /// Around a centre, the origin of a frame whose z-axis is the direction of the outline's middle.
+    Sphere {
+        /// The centre.
+        frame: Frame,
+        /// Of the sphere.
+        radius: f64,
+    },
+    /// Around the z-axis of a frame, symmetric to its plane.
+    Torus {
+        /// The centre and the axis.
+        frame: Frame,
+        /// From the axis to the middle of the tube.
+        major: f64,
+        /// Of the tube.
+        minor: f64,
+    },
+}
+
+impl Carrier {
+    /// A word for it.
+    #[must_use]
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Plane(_) => "plane",
+            Self::Cylinder { .. } => "cylinder",
+            Self::Cone { .. } => "cone",
+            Self::Sphere { .. } => "sphere",
+            Self::Torus { .. } => "torus",
+        }
+    }
+
+    /// How far a point is from it.
+    #[must_use]
+    pub fn distance(&self, point: Point) -> f64 {
+        match self {
+            Self::Plane(frame) => frame.inside(point)[2].abs(),
+            Self::Cylinder { frame, radius } => (round(frame, point)[0] - radius).abs(),
+            Self::Cone { frame, slope } => {
+                let [wide, high] = round(frame, point);
+                (wide - high * slope).abs() / slope.hypot(1.0)
+            }
+            Self::Sphere { frame, radius } => (distance(point, frame.origin) - radius).abs(),
+            Self::Torus { frame, major, minor } => {
+                let [wide, high] = round(frame, point);
+                ((wide - major).hypot(high) - minor).abs()
+            }
+        }
+    }
+}
+
+/// Distance from the axis of a frame, and height.
+pub(super) fn round(frame: &Frame, point: Point) -> [f64; 2] {
+    let [x, y, z] = frame.inside(point);
+    [x.hypot(y), z]
+}
+
+/// Axes that are looked at, at most.
+const AXES: usize = 12;
+
+/// The plane of an outline, if all its points are on it.
+pub(super) fn plane(probes: &[Point], tolerance: f64) -> Option<Carrier> {
+    let (middle, normal) = space::plane(probes)?;
+    let carrier = Carrier::Plane(Frame::around(middle, normal));
+    probes.iter().all(|point| carrier.distance(*point) <= tolerance).then_some(carrier)
+}
+
+/// Surfaces that all points of an outline are on, in the order of preference: cylinder, cone, sphere, torus. O(points · axes).
+pub(super) fn recognise(kinds: &[Kind], probes: &[Point], tolerance: f64) -> Vec<Carrier> {
+    let axes = axes(kinds, probes, tolerance);
+    let mut found: Vec<Carrier> = Vec::new();
+    found.extend(axes.iter().filter_map(|axis| cylinder(axis, probes)));
+    found.extend(parallel(kinds, probes, tolerance));
+    found.extend(axes.iter().filter_map(|axis| cone(axis, probes)));
+    found.extend(sphere(probes));
+    found.extend(axes.iter().filter_map(|axis| torus(axis, probes)));
+    found.retain(|carrier| probes.iter().all(|point| carrier.distance(*point) <= tolerance));
+    found
+}
+
+/// Axes of circles, each once, in the order of the curves.
+fn axes(kinds: &[Kind], probes: &[Point], tolerance: f64) -> Vec<Frame> {
+    let mut axes: Vec<Frame> = Vec::new();
+    let size = probes.first().map_or(0.0, |first| probes.iter().fold(0.0_f64, |most, point| most.max(distance(*first, *point))));
+    for kind in kinds {
+        let Kind::Round { centre, axis, radius } = *kind else { continue };
+        // A circle so large for its outline has no axis to speak of.
+        if radius > 1e4 * size {
+            continue;
+        }
+        let same = axes.iter().any(|frame| {
+            let [.., z] = frame.axes;
+            norm(cross(z, axis)) * size <= 10.0 * tolerance && norm(cross(sub(centre, frame.origin), z)) <= 10.0 * tolerance
+        });
+        if !same && axes.len() < AXES {
+            axes.push(Frame::around(centre, axis));
+        }
+    }
+    axes
+}
+
+fn cylinder(axis: &Frame, probes: &[Point]) -> Option<Carrier> {
+    let sum: f64 = probes.iter().map(|point| round(axis, *point)[0]).sum();
+    let radius = sum / probes.len().max(1) as f64;
+    (radius > 0.0).then_some(Carrier::Cylinder { frame: *axis, radius })
+}
+
+/// A cylinder along straight lines.
+fn parallel(kinds: &[Kind], probes: &[Point], tolerance: f64) -> Option<Carrier> {
+    let mut lines = kinds.iter().filter_map(|kind| if let Kind::Straight(along) = kind { Some(*along) } else { None });
+    let along = lines.next()?;
+    let second = lines.next()?;
+    if norm(cross(along, second)) > 1e-4 {
+        return None;
+    }
+    let frame = Frame::around(space::mean(probes), along);
+    let flat: Vec<[f64; 2]> = probes.iter().map(|point| frame.inside(*point)).map(|[x, y, _]| [x, y]).collect();
+    let (centre, radius) = space::circle(&flat)?;
+    let size = flat.iter().fold(0.0_f64, |most, [x, y]| most.max(x.hypot(*y)));
+    // Of a flatter arc, the radius would be a guess.
+    let is_bent = size * size > 40.0 * tolerance * radius;
+    let origin = frame.outside([centre[0], centre[1], 0.0]);
+    is_bent.then_some(Carrier::Cylinder { frame: Frame { origin, ..frame }, radius })
+}
+
+/// The line of least squares through distances and heights, by its angle.
+fn cone(axis: &Frame, probes: &[Point]) -> Option<Carrier> {
+    let flat: Vec<[f64; 2]> = probes.iter().map(|point| round(axis, *point)).collect();
+    let count = flat.len().max(1) as f64;
+    let [a, b] = flat.iter().fold([0.0; 2], |[a, b], [x, y]| [a + x / count, b + y / count]);
+    let mut sums = [0.0; 3];
+    for [x, y] in flat.iter().map(|[x, y]| [x - a, y - b]) {
+        sums.iter_mut().zip([x * x, x * y, y * y]).for_each(|(sum, x)| *sum += x);
+    }
+    let (sin, cos) = (0.5 * (2.0 * sums[1]).atan2(sums[0] - sums[2])).sin_cos();
+    let slope = cos / sin;
+    if !slope.is_finite() || slope.abs() < 1e-6 || slope.abs() > 1e6 {
+        return None;
+    }
+    let apex = axis.outside([0.0, 0.0, b - a / slope]);
+    let [x, y, z] = axis.axes;
+    // The surface above the apex.
+    let axes = if slope > 0.0 { [x, y, z] } else { [x, scale(y, -1.0), scale(z, -1.0)] };
+    Some(Carrier::Cone { frame: Frame { origin: apex, axes }, slope: slope.abs() })
+}
+
+fn sphere(probes: &[Point]) -> Option<Carrier> {
+    let (centre, radius) = space::sphere(probes)?;
+    let towards = unit(sub(space::mean(probes), centre))?;
+    Some(Carrier::Sphere { frame: Frame::around(centre, towards), radius })
+}
+
+fn torus(axis: &Frame, probes: &[Point]) -> Option<Carrier> {
+    let flat: Vec<[f64; 2]> = probes.iter().map(|point| round(axis, *point)).collect();
+    let ([major, height], minor) = space::circle(&flat)?;
+    let origin = axis.outside([0.0, 0.0, height]);
+    // Tubes that reach the axis are apples and lemons, which outlines do not tell apart.
+    (major > minor).then_some(Carrier::Torus { frame: Frame { origin, ..*axis }, major, minor })
+}

@@ -1,0 +1,113 @@
+//! Outlines filled: the way in.
+
+use rayon::prelude::*;
+
+use super::layout::Corner;
+use super::mesh::Mesh;
+use super::network::{self, Strands};
+use super::options::{Options, Outline};
+use super::orient;
+use super::patch::{Patch, Task};
+use super::report::{Report, Surface};
+use super::strand::Strand;
+use crate::curves::curve::{Shape, Spline};
+
+/// Filled outlines.
+#[derive(Clone, Debug, Default, PartialEq)]
+#[non_exhaustive]
+pub struct Filled {
+    /// Of each outline.
+    pub surfaces: Vec<Surface>,
+    /// Of all outlines.
+    pub mesh: Mesh,
+    /// Of each outline.
+    pub reports: Vec<Report>,
+    /// Curves as cubic B-splines on 0 to 1, where a Coons surface or one to a centre needs them.
+    pub curves: Vec<Option<Spline>>,
+}
+
+/// Why nothing is filled.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum FillError {
+    /// An outline has a curve that there is none of.
+    #[error("outline {outline} has the curve {curve}, which is none")]
+    Unknown {
+        /// Number of the outline.
+        outline: usize,
+        /// Number of the curve.
+        curve: usize,
+    },
+    /// More than 2³² points.
+    #[error("the mesh has more points than can be counted")]
+    Large,
+}
+
+/// Fills outlines. `shapes` are those of the curves, by the numbers that outlines use (of curves that close gaps, too).
+///
+/// Each curve is divided once, by the finest wish of its outlines. An outline in a plane is trimmed from it; one on a cylinder,
+/// cone, sphere or torus, from that; others are Coons surfaces of two to four sides, upon a surface of revolution where one nearly
+/// has these; where they fold, heights of a thin plate over a plane; where that crosses itself, a cone to a centre. What folds then
+/// is left, [`Surface::Fallback`].
+///
+/// O(points · log points), in parallel over curves and outlines.
+///
+/// # Errors
+/// [`FillError`] of curves that do not exist, and of too many points.
+pub fn fill(shapes: &[&Shape], outlines: &[Outline], options: &Options) -> Result<Filled, FillError> {
+    let strands = strands(shapes, outlines)?;
+    let divided = network::divide(&strands, outlines, options);
+    let tasks = outlines.par_iter().zip(&divided.rings).zip(&divided.wanted);
+    let patches: Vec<Patch> = tasks
+        .map(|((outline, rings), &(longest, chord))| Task { outline, strands: &strands, rings, options, longest, chord }.run())
+        .collect();
+    let mut filled = Filled { mesh: Mesh { points: divided.points, ..Mesh::default() }, ..Filled::default() };
+    for (number, patch) in patches.into_iter().enumerate() {
+        let first = filled.mesh.points.len();
+        if first + patch.points.len() >= u32::MAX as usize {
+            return Err(FillError::Large);
+        }
+        let corner = |corner: Corner| match corner {
+            Corner::Rim(number) => number,
+            Corner::Inner(number) => first as u32 + number,
+        };
+        filled.mesh.triangles.extend(patch.triangles.iter().map(|triangle| triangle.map(corner)));
+        filled.mesh.face_of.resize(filled.mesh.triangles.len(), number as u32);
+        filled.mesh.points.extend(patch.points);
+        filled.surfaces.push(patch.surface);
+        filled.reports.push(patch.report);
+    }
+    let flipped = orient::flipped(&filled.mesh, outlines.len());
+    for (triangle, face) in filled.mesh.triangles.iter_mut().zip(&filled.mesh.face_of) {
+        if flipped.get(*face as usize) == Some(&true) {
+            triangle.swap(1, 2);
+        }
+    }
+    filled.curves = used(strands, outlines, &filled.surfaces);
+    filled.reports.iter_mut().zip(flipped).for_each(|(report, is_flipped)| report.is_flipped = is_flipped);
+    Ok(filled)
+}
+
+fn strands<'a>(shapes: &[&'a Shape], outlines: &[Outline]) -> Result<Strands<'a>, FillError> {
+    let mut is_used = vec![false; shapes.len()];
+    for (outline, Outline { outer, inner }) in outlines.iter().enumerate() {
+        for one in std::iter::once(outer).chain(inner).flatten() {
+            let unknown = FillError::Unknown { outline, curve: one.curve };
+            *is_used.get_mut(one.curve).ok_or(unknown)? = true;
+        }
+    }
+    Ok(shapes.par_iter().zip(&is_used).map(|(shape, is_used)| is_used.then(|| Strand::new(shape))).collect())
+}
+
+/// Fitted curves of outlines whose surfaces are blended from them.
+fn used(strands: Strands<'_>, outlines: &[Outline], surfaces: &[Surface]) -> Vec<Option<Spline>> {
+    let mut is_used = vec![false; strands.len()];
+    let blended = |surface: &Surface| matches!(surface, Surface::Coons(_) | Surface::Centre { .. });
+    for (outline, _) in outlines.iter().zip(surfaces).filter(|(_, surface)| blended(surface)) {
+        for one in &outline.outer {
+            is_used.iter_mut().skip(one.curve).take(1).for_each(|used| *used = true);
+        }
+    }
+    let spline = |(strand, is_used): (Option<Strand<'_>>, bool)| strand.filter(|_| is_used)?.into_fitted();
+    strands.into_iter().zip(is_used).map(spline).collect()
+}

@@ -1,0 +1,50 @@
+//! Surfaces between curves, and triangles of them that fit together.
+//!
+//! **In:** curves, and the outlines that they form. **Out:** a surface for each outline, one mesh of all, and what became of
+//! each.
+//! **Promise:** the same result for the same input, whatever the number of threads; outlines that share a curve share its points;
+//! time near linear in curves and points. What no surface fits is left to the filling of mesh holes, with its points.
+
+mod all;
+mod basis;
+mod blend;
+mod body;
+mod carrier;
+mod chart;
+mod coons;
+mod entry;
+mod fit;
+mod improve;
+mod layout;
+mod linear;
+mod measure;
+mod mesh;
+mod nest;
+mod network;
+mod options;
+mod orient;
+mod patch;
+mod pieces;
+mod plate;
+mod report;
+mod revolved;
+mod sides;
+mod space;
+mod spline;
+mod strand;
+#[cfg(test)]
+mod tests;
+mod triangles;
+mod weights;
+
+pub use all::{FilledNetwork, fill_network};
+pub use body::body;
+pub use carrier::Carrier;
+pub use coons::{Base, Coons};
+pub use entry::{FillError, Filled, fill};
+pub use fit::{FitError, Fitted, fit};
+pub use mesh::{Mesh, quality};
+pub use options::{Options, Outline};
+pub use report::{Method, Problem, Report, Surface};
+pub use space::Frame;
+pub use spline::{Jet, SplineSurface};

@@ -1,0 +1,172 @@
+//! Curves of many outlines divided once, so that outlines that share them share their points.
+
+use rayon::prelude::*;
+
+use super::layout::Rim;
+use super::options::{Options, Outline};
+use super::space;
+use super::strand::{Limits, Strand};
+use crate::curves::Use;
+use crate::curves::vector::Point;
+
+/// Curves as outlines need them, by their numbers; `None` of those in no outline.
+pub(super) type Strands<'a> = Vec<Option<Strand<'a>>>;
+
+/// Points of the mesh on curves.
+#[derive(Debug, Default)]
+pub(super) struct Divided {
+    /// All of them.
+    pub(super) points: Vec<Point>,
+    /// Rings of each outline.
+    pub(super) rings: Vec<Vec<Vec<Rim>>>,
+    /// The longest edge and the tolerance of each outline.
+    pub(super) wanted: Vec<(f64, f64)>,
+}
+
+/// Parameters and numbers of the points of a curve.
+type Samples = Vec<(f64, u32)>;
+
+/// Divides curves and gives the rings of outlines. O(points).
+pub(super) fn divide(strands: &Strands<'_>, outlines: &[Outline], options: &Options) -> Divided {
+    let (mut limits, wanted) = limits(strands, outlines, options);
+    let divide = |limits: &[Limits]| -> Vec<Vec<f64>> {
+        let pairs = strands.par_iter().zip(limits);
+        pairs.map(|(strand, limits)| strand.as_ref().map(|strand| strand.samples(limits)).unwrap_or_default()).collect()
+    };
+    let mut samples = divide(&limits);
+    if options.size.is_none() && even(strands, outlines, &samples, &mut limits) {
+        samples = divide(&limits);
+    }
+    let roots = joined(strands.len(), outlines);
+    let mut divided = Divided { wanted, ..Divided::default() };
+    let mut numbers: Vec<Option<u32>> = vec![None; 2 * strands.len()];
+    let mut curves: Vec<Samples> = Vec::with_capacity(strands.len());
+    for (curve, (strand, shares)) in strands.iter().zip(&samples).enumerate() {
+        let mut points = Vec::with_capacity(shares.len());
+        let Some(strand) = strand else {
+            curves.push(points);
+            continue;
+        };
+        for (at, share) in shares.iter().enumerate() {
+            let end = (at == 0).then_some(2 * curve).or((at + 1 == shares.len()).then_some(2 * curve + 1));
+            let root = end.and_then(|end| roots.get(end)).copied();
+            let known = root.and_then(|root| numbers.get(root).copied().flatten());
+            let number = known.unwrap_or_else(|| {
+                divided.points.push(strand.point(*share));
+                divided.points.len() as u32 - 1
+            });
+            if let Some(root) = root {
+                numbers.iter_mut().skip(root).take(1).for_each(|known| *known = Some(number));
+            }
+            points.push((*share, number));
+        }
+        curves.push(points);
+    }
+    let ring = |uses: &Vec<Use>| ring(uses, &curves, &divided.points);
+    divided.rings =
+        outlines.par_iter().map(|outline| std::iter::once(&outline.outer).chain(&outline.inner).map(ring).collect()).collect();
+    divided
+}
+
+fn ring(uses: &[Use], curves: &[Samples], points: &[Point]) -> Vec<Rim> {
+    let mut ring = Vec::new();
+    for (part, one) in uses.iter().enumerate() {
+        let Some(samples) = curves.get(one.curve) else { continue };
+        let rim = |&(share, vertex): &(f64, u32)| Rim {
+            vertex,
+            point: points.get(vertex as usize).copied().unwrap_or_default(),
+            part: part as u32,
+            share: if one.is_reversed { 1.0 - share } else { share },
+        };
+        let count = samples.len().saturating_sub(1);
+        if one.is_reversed {
+            ring.extend(samples.iter().rev().take(count).map(rim));
+        } else {
+            ring.extend(samples.iter().take(count).map(rim));
+        }
+    }
+    ring
+}
+
+/// How finely each curve is divided, and for each outline its longest edge and tolerance.
+fn limits(strands: &Strands<'_>, outlines: &[Outline], options: &Options) -> (Vec<Limits>, Vec<(f64, f64)>) {
+    let free = Limits { chord: f64::INFINITY, angle: options.angle, size: options.size.unwrap_or(f64::INFINITY), least: 1 };
+    let mut limits = vec![free; strands.len()];
+    let length = |one: &Use| strands.get(one.curve).and_then(Option::as_ref).map_or(0.0, |strand| strand.length);
+    let mut wanted = Vec::with_capacity(outlines.len());
+    for outline in outlines {
+        let uses = || std::iter::once(&outline.outer).chain(&outline.inner).flatten();
+        let probes = uses().filter_map(|one| strands.get(one.curve).and_then(Option::as_ref)).flat_map(|strand| &strand.probes);
+        let diagonal = space::size(&probes.copied().collect::<Vec<_>>());
+        let chord = options.chord.unwrap_or(2e-3 * diagonal);
+        let shortest = uses().map(length).filter(|length| *length > 1e-6 * diagonal).fold(f64::INFINITY, f64::min);
+        wanted.push((options.size.unwrap_or(f64::INFINITY), chord));
+        for uses in std::iter::once(&outline.outer).chain(&outline.inner) {
+            let least = match uses.len() {
+                1 => 8,
+                2 => 2,
+                _ => 1,
+            };
+            for one in uses {
+                let Some(limit) = limits.get_mut(one.curve) else { continue };
+                limit.chord = limit.chord.min(chord);
+                limit.least = limit.least.max(least);
+                if options.size.is_none() {
+                    limit.size = limit.size.min(shortest.max(length(one) / 32.0));
+                }
+            }
+        }
+    }
+    (limits, wanted)
+}
+
+/// Lets edges of an outline be at most twice as long as those of its finest curve, but for 1/64 of each curve; whether any are
+/// finer now.
+fn even(strands: &Strands<'_>, outlines: &[Outline], samples: &[Vec<f64>], limits: &mut [Limits]) -> bool {
+    let edge = |curve: usize| {
+        let length = strands.get(curve).and_then(Option::as_ref).map_or(0.0, |strand| strand.length);
+        (length, length / samples.get(curve).map_or(1, |samples| samples.len().saturating_sub(1).max(1)) as f64)
+    };
+    let mut is_any = false;
+    for outline in outlines {
+        let uses = || std::iter::once(&outline.outer).chain(&outline.inner).flatten();
+        let edges = uses().map(|one| edge(one.curve)).filter(|(length, _)| *length > 0.0);
+        let finest = edges.fold(f64::INFINITY, |least, (_, edge)| least.min(edge));
+        for one in uses() {
+            let (length, now) = edge(one.curve);
+            let size = (2.0 * finest).max(length / 64.0);
+            if let Some(limit) = limits.get_mut(one.curve).filter(|_| now > 1.01 * size) {
+                limit.size = limit.size.min(size);
+                is_any = true;
+            }
+        }
+    }
+    is_any
+}
+
+/// Ends of curves (2 of each, by twice its number) that outlines join, each with the lowest of its kind. Near O(uses).
+pub(super) fn joined(curves: usize, outlines: &[Outline]) -> Vec<usize> {
+    let mut parents: Vec<usize> = (0..2 * curves).collect();
+    let end = |one: &Use, is_last: bool| 2 * one.curve + usize::from(is_last != one.is_reversed);
+    for uses in outlines.iter().flat_map(|outline| std::iter::once(&outline.outer).chain(&outline.inner)) {
+        for (one, next) in uses.iter().zip(uses.iter().cycle().skip(1)) {
+            let (a, b) = (root(&mut parents, end(one, true)), root(&mut parents, end(next, false)));
+            let (low, high) = (a.min(b), a.max(b));
+            parents.iter_mut().skip(high).take(1).for_each(|parent| *parent = low);
+        }
+    }
+    (0..2 * curves).map(|at| root(&mut parents, at)).collect()
+}
+
+/// The lowest of a set; the way there is halved (R. E. Tarjan, J. van Leeuwen 1984).
+fn root(parents: &mut [usize], mut at: usize) -> usize {
+    loop {
+        let parent = parents.get(at).copied().unwrap_or(at);
+        if parent == at {
+            return at;
+        }
+        let next = parents.get(parent).copied().unwrap_or(parent);
+        parents.iter_mut().skip(at).take(1).for_each(|entry| *entry = next);
+        at = next;
+    }
+}

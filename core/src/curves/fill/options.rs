@@ -1,0 +1,63 @@
+//! What is wanted of filled loops.
+
+use crate::curves::loops::Loop;
+use crate::curves::{Face, Use};
+
+/// What is wanted. Lengths are in the unit of the curves.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Options {
+    /// How far fitted curves may be from their own; `None`: 5 · 10⁻⁷ of the length of each.
+    pub tolerance: Option<f64>,
+    /// How far curves may be from a plane, cylinder, cone, sphere or torus that is taken for their surface; `None`: 10⁻⁵ of the
+    /// outline's size, or the gaps between its curves.
+    pub carrier: Option<f64>,
+    /// Whether such surfaces are looked for, planes apart, which always are.
+    pub recognises: bool,
+    /// Curves are joined into one side where the cosine between their tangents is above this.
+    pub smooth: f64,
+    /// How far edges of the mesh may be from curves and surfaces; `None`: 2 · 10⁻³ of the size of each outline.
+    pub chord: Option<f64>,
+    /// How much curves may turn along an edge of the mesh, radians.
+    pub angle: f64,
+    /// The longest edge of the mesh; `None`: as the outline's shortest curve is, but no less than 1/32 of each curve.
+    pub size: Option<f64>,
+    /// Points of the mesh within a surface, at most, or four times those of its outline if that is more.
+    pub inner: usize,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            tolerance: None,
+            carrier: None,
+            recognises: true,
+            smooth: 0.9,
+            chord: None,
+            angle: 0.35,
+            size: None,
+            inner: 100_000,
+        }
+    }
+}
+
+/// The outline of a surface: a closed loop of curves, and others around its holes.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Outline {
+    /// Curves, each followed by the next, the last one by the first.
+    pub outer: Vec<Use>,
+    /// Around each hole.
+    pub inner: Vec<Vec<Use>>,
+}
+
+impl From<&Loop> for Outline {
+    fn from(from: &Loop) -> Self {
+        Self { outer: from.uses.clone(), inner: Vec::new() }
+    }
+}
+
+impl From<&Face> for Outline {
+    fn from(from: &Face) -> Self {
+        Self { outer: from.outer.clone(), inner: from.inner.clone() }
+    }
+}

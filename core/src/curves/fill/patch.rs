@@ -1,0 +1,280 @@
+//! The surface and the mesh of one outline: methods tried in their order of trust.
+
+use super::blend::{self, Curves};
+use super::carrier::{self, Carrier};
+use super::fit::FitError;
+use super::improve::Improved;
+use super::layout::{self, Corner, Layout, Rim};
+use super::options::{Options, Outline};
+use super::report::{Method, Problem, Report, Surface};
+use super::sides;
+use super::space;
+use super::strand::{Kind, Strand};
+use super::triangles;
+use crate::curves::Use;
+use crate::curves::vector::{Point, distance, dot, scale};
+
+/// Gaps between curves count as inaccuracy of these up to this share of the size.
+const GAP: f64 = 3e-5;
+/// Products of points within and on outlines that heights may cost.
+const COSTLIEST: f64 = 1e8;
+
+/// An outline with all that it needs.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Task<'a> {
+    pub(super) outline: &'a Outline,
+    /// By the numbers of curves.
+    pub(super) strands: &'a [Option<Strand<'a>>],
+    pub(super) rings: &'a [Vec<Rim>],
+    pub(super) options: &'a Options,
+    pub(super) longest: f64,
+    pub(super) chord: f64,
+}
+
+/// The surface of an outline and its triangles.
+#[derive(Clone, Debug)]
+pub(super) struct Patch {
+    pub(super) surface: Surface,
+    pub(super) report: Report,
+    pub(super) points: Vec<Point>,
+    pub(super) triangles: Vec<[Corner; 3]>,
+}
+
+type Meshed = (Vec<Point>, Vec<[Corner; 3]>);
+
+impl<'a> Task<'a> {
+    fn uses(&self) -> impl Iterator<Item = (&'a Strand<'a>, Use)> {
+        let strands = self.strands;
+        let all = std::iter::once(&self.outline.outer).chain(&self.outline.inner).flatten();
+        all.filter_map(move |one| strands.get(one.curve).and_then(Option::as_ref).map(|strand| (strand, *one)))
+    }
+
+    /// Fills it.
+    pub(super) fn run(&self) -> Patch {
+        let probes: Vec<Point> = self.uses().flat_map(|(strand, _)| strand.probes.iter().copied()).collect();
+        let size = space::size(&probes);
+        let cosines = self.cosines();
+        let corners = sides::corners(&cosines, self.options.smooth);
+        let mut report = Report {
+            method: Method::Fallback,
+            sides: cosines.iter().filter(|cosine| **cosine <= self.options.smooth).count(),
+            size,
+            error: 0.0,
+            chord: self.sag(),
+            gap: self.gap(),
+            is_folded: false,
+            is_ambiguous: self.is_ambiguous(),
+            is_flipped: false,
+            problem: None,
+        };
+        if self.rings.first().is_none_or(|ring| ring.len() < 3) {
+            report.problem = Some(Problem::Small);
+            return self.fallback(report);
+        }
+        let tolerance = self.options.carrier.unwrap_or(1e-5 * size).max(report.gap.min(GAP * size));
+        let patch = self.carrier(&probes, tolerance, &mut report).or_else(|| self.blended(cosines, &corners, &mut report));
+        match patch {
+            Some((surface, (points, triangles))) => Patch { surface, report, points, triangles },
+            None => self.fallback(report),
+        }
+    }
+
+    fn fallback(&self, report: Report) -> Patch {
+        let rings = self.rings.iter().map(|ring| ring.iter().map(|rim| rim.vertex).collect()).collect();
+        Patch { surface: Surface::Fallback(rings), report, points: Vec::new(), triangles: Vec::new() }
+    }
+
+    fn carrier(&self, probes: &[Point], tolerance: f64, report: &mut Report) -> Option<(Surface, Meshed)> {
+        let mut try_one = |carrier: Carrier, method: Method| {
+            let layout = layout::on_carrier(&carrier, self.rings, tolerance)?;
+            let meshed = self.mesh(layout)?;
+            report.method = method;
+            report.error = probes.iter().fold(0.0_f64, |most, point| most.max(carrier.distance(*point)));
+            Some((Surface::Carrier(carrier), meshed))
+        };
+        if let Some(found) = carrier::plane(probes, tolerance).and_then(|plane| try_one(plane, Method::Plane)) {
+            return Some(found);
+        }
+        if !self.options.recognises {
+            return None;
+        }
+        let kinds: Vec<Kind> = self.uses().map(|(strand, _)| strand.kind).collect();
+        carrier::recognise(&kinds, probes, tolerance).into_iter().find_map(|carrier| try_one(carrier, Method::Recognised))
+    }
+
+    /// Coons surfaces, heights, and a centre.
+    fn blended(&self, cosines: Vec<f64>, corners: &[usize], report: &mut Report) -> Option<(Surface, Meshed)> {
+        if self.rings.len() > 1 {
+            let found = self.heights(report);
+            report.problem = found.is_none().then_some(Problem::Holes);
+            return found;
+        }
+        let curves = match self.curves(cosines) {
+            Ok((curves, error)) => {
+                report.error = error;
+                curves
+            }
+            Err(problem) => {
+                report.problem = Some(problem.into());
+                return None;
+            }
+        };
+        let found =
+            self.coons(&curves, corners, report).or_else(|| self.heights(report)).or_else(|| self.centre(&curves, report));
+        report.problem = found.is_none().then_some(Problem::Folds);
+        found
+    }
+
+    fn coons(&self, curves: &Curves, corners: &[usize], report: &mut Report) -> Option<(Surface, Meshed)> {
+        let (plain, lengths) = blend::coons(curves, corners).ok()?;
+        let based = if self.options.recognises { blend::based(&plain) } else { None };
+        for coons in based.into_iter().chain([plain]) {
+            report.is_folded = coons.is_folded(8);
+            if report.is_folded {
+                continue;
+            }
+            let layout = blend::laid(coons.clone(), &lengths, self.rings.first()?);
+            let Some(meshed) = self.mesh(layout) else { continue };
+            report.method = match coons.sides {
+                2 => Method::Ruled,
+                3 => Method::Triangle,
+                _ => Method::Coons,
+            };
+            return Some((Surface::Coons(Box::new(coons)), meshed));
+        }
+        None
+    }
+
+    fn heights(&self, report: &mut Report) -> Option<(Surface, Meshed)> {
+        let count = self.rings.iter().map(Vec::len).sum::<usize>() as f64;
+        if count * count > COSTLIEST {
+            return None;
+        }
+        let (layout, frame) = blend::heights(self.rings)?;
+        let most = (COSTLIEST / count) as usize;
+        let meshed = self.mesh_within(layout, most.min(self.options.inner))?;
+        report.method = Method::Heights;
+        Some((Surface::Heights(frame), meshed))
+    }
+
+    fn centre(&self, curves: &Curves, report: &mut Report) -> Option<(Surface, Meshed)> {
+        let blend::Cone { layout, curve, ends, centre } = blend::centre(curves, self.rings.first()?).ok()?;
+        if blend::is_folded(&curve, centre) {
+            return None;
+        }
+        let meshed = self.mesh(layout)?;
+        report.method = Method::Centre;
+        Some((Surface::Centre { curve: Box::new(curve), ends, centre }, meshed))
+    }
+
+    fn mesh(&self, layout: Layout) -> Option<Meshed> {
+        // Long outlines need points in proportion.
+        let rim: usize = self.rings.iter().map(Vec::len).sum();
+        self.mesh_within(layout, self.options.inner.max(4 * rim))
+    }
+
+    fn mesh_within(&self, layout: Layout, most: usize) -> Option<Meshed> {
+        let Layout { chart, rings, added, is_mirrored } = layout;
+        let mirrored = |[x, y]: [f64; 2]| [if is_mirrored { -x } else { x }, y];
+        let places: Vec<Vec<[f64; 2]>> =
+            rings.iter().map(|ring| ring.iter().map(|(_, place)| mirrored(*place)).collect()).collect();
+        let longest = self.longest.min(chart.longest(self.chord, self.options.angle));
+        let flat = triangles::triangles(&places, longest, most)?;
+        let corners: Vec<Corner> = rings.iter().flatten().map(|(corner, _)| *corner).collect();
+        let known = self.rings.iter().flatten().map(|rim| (rim.vertex, rim.point));
+        let mut known: Vec<(u32, Point)> = known.collect();
+        known.sort_by_key(|(vertex, _)| *vertex);
+        let point = |corner: &Corner| match corner {
+            Corner::Rim(vertex) => {
+                let at = known.partition_point(|(number, _)| number < vertex);
+                known.get(at).map_or([0.0; 3], |(_, point)| *point)
+            }
+            Corner::Inner(number) => added.get(*number as usize).copied().unwrap_or_default(),
+        };
+        let rim = corners.iter().map(point).collect();
+        let mut improved = Improved::new(flat, rim, &chart, is_mirrored);
+        improved.run(most);
+        let first = added.len() as u32;
+        let corner = |number: u32| {
+            let within = || Corner::Inner(first + number - corners.len() as u32);
+            corners.get(number as usize).copied().unwrap_or_else(within)
+        };
+        let triangles = improved.flat.triangles.iter().map(|triangle| triangle.map(corner)).collect();
+        let points = added.iter().chain(improved.points.get(corners.len()..).unwrap_or_default()).copied().collect();
+        Some((points, triangles))
+    }
+
+    /// Curves fitted, in the direction of the outer loop, and the largest error.
+    fn curves(&self, cosines: Vec<f64>) -> Result<(Curves, f64), FitError> {
+        let mut parts = Vec::with_capacity(self.outline.outer.len());
+        let mut largest = 0.0_f64;
+        for one in &self.outline.outer {
+            let Some(strand) = self.strands.get(one.curve).and_then(Option::as_ref) else { continue };
+            let (spline, error) = strand.fitted(self.options.tolerance).as_ref().map_err(Clone::clone)?;
+            largest = largest.max(*error);
+            let spline = if one.is_reversed { spline.clone().reversed() } else { spline.clone() };
+            parts.push((spline, strand.length));
+        }
+        Ok((Curves { parts, cosines }, largest))
+    }
+
+    /// Cosines between tangents where each curve of the outer loop begins.
+    fn cosines(&self) -> Vec<f64> {
+        let turned = |one: &Use| {
+            let strand = self.strands.get(one.curve).and_then(Option::as_ref)?;
+            let [start, end] = strand.tangents();
+            Some(if one.is_reversed { [scale(end, -1.0), scale(start, -1.0)] } else { [start, end] })
+        };
+        let tangents: Vec<[Point; 2]> = self.outline.outer.iter().filter_map(turned).collect();
+        let before = tangents.iter().cycle().skip(tangents.len().saturating_sub(1));
+        tangents.iter().zip(before).map(|(one, before)| dot(before[1], one[0])).collect()
+    }
+
+    /// The largest distance of curves from their edges, at the middles of these.
+    fn sag(&self) -> f64 {
+        let mut largest = 0.0_f64;
+        for ring in self.rings {
+            for (one, next) in ring.iter().zip(ring.iter().cycle().skip(1)) {
+                if let Some(middle) = self.middle(one, next) {
+                    let chord = scale(crate::curves::vector::add(one.point, next.point), 0.5);
+                    largest = largest.max(distance(middle, chord));
+                }
+            }
+        }
+        largest
+    }
+
+    /// The point of a curve in the middle of an edge, of the outer loop alone; straight curves have none.
+    fn middle(&self, one: &Rim, next: &Rim) -> Option<Point> {
+        let used = self.outline.outer.get(one.part as usize)?;
+        let strand = self.strands.get(used.curve).and_then(Option::as_ref)?;
+        let to = if next.part == one.part && next.share > one.share { next.share } else { 1.0 };
+        let middle = 0.5 * (one.share + to);
+        (!matches!(strand.kind, Kind::Straight(_))).then(|| strand.point(if used.is_reversed { 1.0 - middle } else { middle }))
+    }
+
+    /// The largest distance of ends that follow each other.
+    fn gap(&self) -> f64 {
+        let mut largest = 0.0_f64;
+        for uses in std::iter::once(&self.outline.outer).chain(&self.outline.inner) {
+            let ends = |one: &Use| {
+                self.strands.get(one.curve).and_then(Option::as_ref).map(|strand| (strand.shape.ends(), one.is_reversed))
+            };
+            let turned = |one: &Use| ends(one).map(|([a, b], is_reversed)| if is_reversed { [b, a] } else { [a, b] });
+            let all: Vec<[Point; 2]> = uses.iter().filter_map(turned).collect();
+            let next = all.iter().cycle().skip(1);
+            largest = all.iter().zip(next).fold(largest, |most, (one, next)| most.max(distance(one[1], next[0])));
+        }
+        largest
+    }
+
+    /// Whether its curves are one circle, or circles around one axis alone.
+    fn is_ambiguous(&self) -> bool {
+        self.uses().all(|(strand, _)| matches!(strand.kind, Kind::Round { .. }))
+            && self
+                .rings
+                .iter()
+                .zip(std::iter::once(&self.outline.outer).chain(&self.outline.inner))
+                .all(|(_, uses)| uses.len() == 1)
+    }
+}

@@ -1,0 +1,98 @@
+//! What became of outlines.
+
+use super::carrier::Carrier;
+use super::coons::Coons;
+use super::fit::FitError;
+use super::space::Frame;
+use crate::curves::curve::Spline;
+use crate::curves::vector::Point;
+
+/// How an outline was filled.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[non_exhaustive]
+pub enum Method {
+    /// All curves are in one plane.
+    Plane,
+    /// All curves are on one cylinder, cone, sphere or torus.
+    Recognised,
+    /// Four sides, bilinearly blended; upon a surface of revolution, if one nearly has them.
+    Coons,
+    /// Three sides, the fourth one a point.
+    Triangle,
+    /// Straight from one side to the other.
+    Ruled,
+    /// Heights over a plane, those of a thin plate through the outline.
+    Heights,
+    /// Straight from the outline to a point in its middle.
+    Centre,
+    /// By none: the outline is left to the filling of mesh holes.
+    Fallback,
+}
+
+/// The surface of an outline.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Surface {
+    /// Trimmed by the outline.
+    Carrier(Carrier),
+    /// Whole.
+    Coons(Box<Coons>),
+    /// The mesh alone has it: heights over the x-y-plane of a frame.
+    Heights(Frame),
+    /// Straight from a closed curve to a point: `centre + v (curve(u) − centre)`.
+    Centre {
+        /// Closed, cubic, on 0 to 1.
+        curve: Box<Spline>,
+        /// Where each curve of the outline begins on it, and 1.
+        ends: Vec<f64>,
+        /// The point at v = 0.
+        centre: Point,
+    },
+    /// No surface: rings of numbers of points of the mesh, the outer one first, for the filling of mesh holes.
+    Fallback(Vec<Vec<u32>>),
+}
+
+/// Why an outline has no surface.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Problem {
+    /// A curve of it could not be fitted.
+    #[error(transparent)]
+    Fit(#[from] FitError),
+    /// It has less than three points.
+    #[error("less than three points")]
+    Small,
+    /// All surfaces that were tried fold, and no plane shows the outline without crossings.
+    #[error("every surface folds")]
+    Folds,
+    /// Holes are filled in planes and on cylinders, cones, spheres and tori alone.
+    #[error("holes in a surface that is no plane, cylinder, cone, sphere or torus")]
+    Holes,
+}
+
+/// What became of an outline. Lengths are in the unit of the curves.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Report {
+    /// How it was filled.
+    pub method: Method,
+    /// Sides that its curves form by their corners; 0 if it is smooth all around.
+    pub sides: usize,
+    /// The diagonal of a box around the outline.
+    pub size: f64,
+    /// No point of a curve is farther from the surface: fitted curves by their error (above the tolerance where a curve does not
+    /// come nearer in 24 rounds), recognised surfaces by points of the outline.
+    pub error: f64,
+    /// No point of a curve is farther from the edges of the mesh along it, at samples.
+    pub chord: f64,
+    /// The largest distance between ends of curves that follow each other.
+    pub gap: f64,
+    /// Whether a Coons surface of it folds.
+    pub is_folded: bool,
+    /// Whether other simple surfaces have the same outline: its curve is a circle, or its curves are two circles around one axis.
+    pub is_ambiguous: bool,
+    /// Whether triangles run against the direction of the outline, so that they agree with those of other outlines.
+    pub is_flipped: bool,
+    /// Why there is no surface.
+    pub problem: Option<Problem>,
+}

@@ -1,0 +1,108 @@
+//! Four (or three) sides as those of a surface of revolution, exactly or nearly.
+//!
+//! Two opposite sides are the same profile, turned about an axis; the curves between them are the same up to their size. In the
+//! plane across the axis, with its points as complex numbers, each row of control points is the first one times a number: that of the
+//! profile's point by that of its beginning. The product of two B-splines is one, so nothing is approximated.
+
+use super::coons::Coons;
+use super::space::Frame;
+use super::spline::SplineSurface;
+use crate::curves::curve::{CurveError, Spline};
+use crate::curves::vector::{Point, add, cross, distance, dot, norm, scale, sub, unit};
+
+/// Samples of a side.
+const SAMPLES: u32 = 8;
+/// Of smaller angles between profiles, their axis would be a guess.
+const LEAST: f64 = 0.05;
+
+/// A surface of revolution whose sides are no farther than a distance from those of a Coons surface, at samples: the first side along
+/// and one across are the same. `None` if there is none. O(control points).
+pub(super) fn revolved(coons: &Coons, tolerance: f64) -> Option<SplineSurface> {
+    let ways = [false, true].into_iter().filter_map(|is_turned| {
+        let (along, across) = if is_turned { (&coons.across, &coons.along) } else { (&coons.along, &coons.across) };
+        let surface = between(along.each_ref(), across.each_ref(), tolerance)?;
+        let surface = if is_turned { transposed(&surface).ok()? } else { surface };
+        let off = off(coons, &surface);
+        (off <= tolerance).then_some((off, surface))
+    });
+    ways.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, surface)| surface)
+}
+
+/// The largest distance of sides at samples.
+fn off(coons: &Coons, surface: &SplineSurface) -> f64 {
+    let mut largest = 0.0_f64;
+    for t in (0..=SAMPLES).map(|at| f64::from(at) / f64::from(SAMPLES)) {
+        let on = |side: &Spline| side.point_and_derivative(t).0;
+        let pairs = [
+            (on(&coons.along[0]), [t, 0.0]),
+            (on(&coons.along[1]), [t, 1.0]),
+            (on(&coons.across[0]), [0.0, t]),
+            (on(&coons.across[1]), [1.0, t]),
+        ];
+        for (point, place) in pairs {
+            largest = largest.max(distance(point, surface.jet(place).point));
+        }
+    }
+    largest
+}
+
+/// The frame about whose z-axis one profile turns into the other.
+fn axis(profiles: [&Spline; 2], tolerance: f64) -> Option<Frame> {
+    let points = profiles.map(|side| [0.0, 0.5, 1.0].map(|t| side.point_and_derivative(t).0));
+    let frame = |[a, b, c]: [Point; 3]| {
+        let x = unit(sub(c, a))?;
+        let z = unit(cross(x, sub(b, a)))?;
+        // Of a profile that is straight, nothing tells how it is turned; such surfaces are blended exactly.
+        (norm(cross(x, sub(b, a))) > 1e-3 * distance(a, c)).then(|| [x, cross(z, x), z])
+    };
+    let [from, to] = [frame(points[0])?, frame(points[1])?];
+    // The rotation from one frame to the other: its antisymmetric part is the axis times the sine.
+    let twice = from.iter().zip(&to).fold([0.0; 3], |sum, (a, b)| add(sum, cross(*a, *b)));
+    let cosine = 0.5 * (from.iter().zip(&to).map(|(a, b)| dot(*a, *b)).sum::<f64>() - 1.0);
+    let angle = (0.5 * norm(twice)).atan2(cosine);
+    let z = unit(twice).filter(|_| angle > LEAST && angle < std::f64::consts::PI - LEAST)?;
+    let mut origin = [0.0; 3];
+    for (a, b) in points[0].iter().zip(&points[1]) {
+        let chord = sub(*b, *a);
+        let along = dot(chord, z);
+        if along.abs() > tolerance {
+            return None;
+        }
+        let middle = scale(add(*a, *b), 0.5);
+        let centre = add(middle, scale(cross(z, chord), 0.5 / (0.5 * angle).tan()));
+        origin = add(origin, scale(sub(centre, scale(z, dot(centre, z))), 1.0 / 3.0));
+    }
+    Some(Frame::around(origin, z))
+}
+
+/// The surface from one profile to the other.
+fn between([a, c]: [&Spline; 2], [d, b]: [&Spline; 2], tolerance: f64) -> Option<SplineSurface> {
+    let frame = axis([d, b], tolerance)?;
+    let flat = |point: &Point| {
+        let [x, y, z] = frame.inside(*point);
+        ([x, y], z)
+    };
+    let ends = [d.points().first()?, d.points().last()?].map(|point| flat(point).0);
+    let [near, far] = ends.map(|[x, y]| x.hypot(y));
+    // The row that is farther from the axis: the other one may be a point on it.
+    let (row, [p, q]) = if near >= far { (a, ends[0]) } else { (c, ends[1]) };
+    let squared = p * p + q * q;
+    if squared <= tolerance * tolerance {
+        return None;
+    }
+    let point = |along: &Point, profile: &Point| {
+        let ([x, y], ([u, v], height)) = (flat(along).0, flat(profile));
+        // (u + iv) / (p + iq) · (x + iy)
+        let [re, im] = [(u * p + v * q) / squared, (v * p - u * q) / squared];
+        frame.outside([x * re - y * im, x * im + y * re, height])
+    };
+    let rows = row.points().iter().map(|along| d.points().iter().map(|profile| point(along, profile)).collect()).collect();
+    SplineSurface::new([3, 3], [row.knots().to_vec(), d.knots().to_vec()], rows, None).ok()
+}
+
+fn transposed(surface: &SplineSurface) -> Result<SplineSurface, CurveError> {
+    let ([p, q], [u, v]) = (surface.degrees(), surface.knots().clone());
+    let columns = surface.points().first().map_or(0, Vec::len);
+    let points = (0..columns).map(|at| surface.points().iter().filter_map(|row| row.get(at).copied()).collect()).collect();
+    SplineSurface::new([q, p], [v, u], points, None)
+}

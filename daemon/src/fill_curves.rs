@@ -1,0 +1,229 @@
+//! `suture fill-curves`: surfaces between curves of CAD programs, as a mesh or as surfaces.
+
+use std::collections::BTreeMap;
+use std::io::{BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+use serde_json::{Value, json};
+use suture_core::curves::fill::{self, FilledNetwork, Method, Options};
+use suture_core::curves::{self, Network, export, loops};
+use suture_core::words::{self, Counted};
+use suture_core::{CurveMesh, OutputFormat, Quiet};
+
+use crate::cli::meshes::FillCurvesArgs;
+use crate::draft::Draft;
+use crate::exit::Exit;
+use crate::fsx;
+use crate::naming;
+use crate::rights::Rights;
+use crate::say::{complain, plain, print};
+
+/// Outlines that are named one by one.
+const LISTED: usize = 20;
+
+/// The kind of file that is written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Kind {
+    Mesh(OutputFormat),
+    Iges,
+    Step,
+}
+
+/// The outcome of one file.
+struct Done {
+    network: Network,
+    filled: FilledNetwork,
+    /// Outlines that the written file does not have.
+    left: Vec<usize>,
+    mesh: Option<CurveMesh>,
+}
+
+/// Fills the curves of a file; with 1 if an outline is left, with 2 if nothing is written.
+pub(crate) fn run(args: &FillCurvesArgs) -> Exit {
+    match fill(args) {
+        Ok(done) => {
+            let text = if args.json { format!("{}\n", as_json(args, &done)) } else { as_text(args, &done) };
+            print(text.as_bytes(), if done.left.is_empty() { Exit::Good } else { Exit::NotGood })
+        }
+        Err(line) => {
+            complain(&line);
+            Exit::Refused
+        }
+    }
+}
+
+fn fill(args: &FillCurvesArgs) -> Result<Done, String> {
+    let kind = kind_of(&args.output)?;
+    naming::check_one(std::slice::from_ref(&args.input), &args.output, args.force)?;
+    let shown = args.input.display();
+    let bytes = std::fs::read(&args.input).map_err(|error| format!("{shown}: cannot be read: {error}"))?;
+    let network = curves::read(&bytes).map_err(|error| format!("{shown}: cannot be read as curves: {error}"))?;
+    drop(bytes);
+    let mut how = loops::Options::default();
+    how.closes_gaps = args.close_gaps.is_some();
+    how.longest_gap = args.close_gaps.unwrap_or_default();
+    let mut options = Options::default();
+    (options.tolerance, options.chord, options.size) = (args.tolerance, args.chord, args.edge);
+    options.angle = args.angle.map_or(options.angle, f64::to_radians);
+    let filled = fill::fill_network(&network, (!args.loops, &how), &options).map_err(|error| format!("{shown}: {error}"))?;
+    if filled.outlines.is_empty() {
+        return Err(format!(
+            "{shown}: its curves form no closed loop; `suture curves` says which lead nowhere, and --close-gaps may help"
+        ));
+    }
+    let (left, mesh) = write(args, kind, &network, &filled)?;
+    Ok(Done { network, filled, left, mesh })
+}
+
+fn kind_of(output: &Path) -> Result<Kind, String> {
+    let ending = output.extension().and_then(|ending| ending.to_str()).unwrap_or_default().to_ascii_lowercase();
+    match ending.as_str() {
+        "igs" | "iges" => Ok(Kind::Iges),
+        "stp" | "step" => Ok(Kind::Step),
+        other => OutputFormat::of_ending(other).map(Kind::Mesh).ok_or_else(|| {
+            format!(
+                "{}: its ending says no format; one of stl, 3mf, ply, off, obj, amf for a mesh, igs or step for surfaces",
+                output.display()
+            )
+        }),
+    }
+}
+
+/// Writes the file; the outlines that it lacks, and what is said of a mesh.
+fn write(
+    args: &FillCurvesArgs,
+    kind: Kind,
+    network: &Network,
+    filled: &FilledNetwork,
+) -> Result<(Vec<usize>, Option<CurveMesh>), String> {
+    let (output, shown) = (&args.output, args.output.display());
+    let failed = |error: std::io::Error| format!("{shown}: cannot be written: {error}");
+    let draft = Draft::new(fsx::folder_of(output)).map_err(failed)?;
+    let done = match kind {
+        Kind::Mesh(format) => {
+            let mut limits = args.spend.limits(false);
+            limits.spool.get_or_insert_with(|| fsx::folder_of(output).to_owned());
+            let of = (args.input.as_path(), &filled.filled, network.unit.millimetres);
+            let mesh = suture_core::write_curve_mesh(of, (&draft.path(), format), &limits, &Quiet);
+            let mesh = mesh.map_err(|error| error.to_string())?;
+            (mesh.open.clone(), Some(mesh))
+        }
+        Kind::Iges | Kind::Step => {
+            let (body, left) = fill::body(&filled.shapes(network), &filled.outlines, &filled.filled, &network.unit);
+            let name = args.input.file_stem().unwrap_or_default().to_string_lossy();
+            let header = export::Header { name: &name, time: None, system: concat!("Suture ", env!("CARGO_PKG_VERSION")) };
+            let file = std::fs::OpenOptions::new().write(true).open(draft.path()).map_err(failed)?;
+            let mut sink = BufWriter::new(file);
+            let written = if kind == Kind::Iges {
+                export::write_iges(&body, &header, &mut sink)
+            } else {
+                export::write_step(&body, &header, &mut sink)
+            };
+            written.map_err(|error| format!("{shown}: {error}"))?;
+            sink.flush().map_err(failed)?;
+            (left, None)
+        }
+    };
+    draft.sync().map_err(failed)?;
+    let rights = Rights::of(&std::fs::metadata(&args.input).map_err(failed)?);
+    draft.place(output, rights, args.force).map_err(failed)?;
+    fsx::sync_dir(fsx::folder_of(output)).map_err(failed)?;
+    Ok(done)
+}
+
+/// The name of a method for people.
+fn name(method: Method) -> &'static str {
+    match method {
+        Method::Plane => "plane",
+        Method::Recognised => "cylinder, cone, sphere or torus",
+        Method::Coons => "four sides blended",
+        Method::Triangle => "three sides blended",
+        Method::Ruled => "ruled between two sides",
+        Method::Heights => "heights over a plane",
+        Method::Centre => "ruled to a centre",
+        _ => "no surface",
+    }
+}
+
+/// A table for people.
+fn as_text(args: &FillCurvesArgs, done: &Done) -> String {
+    let Done { network, filled, left, mesh } = done;
+    let unit = &network.unit.name;
+    let outlines = Counted(filled.outlines.len() as u64, "outline", "outlines");
+    let made =
+        mesh.as_ref().map_or_else(|| "surfaces".to_owned(), |mesh| words::triangles(mesh.report.input.triangles).to_string());
+    let from = if filled.loops.is_none() { "faces of the file" } else { "loops of its curves" };
+    let mut lines = vec![format!("{}: {outlines} ({from}) -> {}: {made}", args.input.display(), args.output.display())];
+    if mesh.is_some() && network.unit.millimetres != 1.0 {
+        lines.push(format!("  unit    {unit}, {} mm; the mesh is in millimetres", network.unit.millimetres));
+    }
+    let mut methods: BTreeMap<Method, (u64, f64)> = BTreeMap::new();
+    for report in &filled.filled.reports {
+        let (count, error) = methods.entry(report.method).or_default();
+        (*count, *error) = (*count + 1, error.max(report.error));
+    }
+    for (method, (count, error)) in methods {
+        let of = Counted(count, "outline", "outlines");
+        let within = if method == Method::Fallback { String::new() } else { format!(", curves within {error:.1e} {unit} of it") };
+        lines.push(format!("  filled  {}: {of}{within}", name(method)));
+    }
+    if let Some(mesh) = mesh {
+        if !mesh.closed_as_holes.is_empty() {
+            let of = Counted(mesh.closed_as_holes.len() as u64, "outline", "outlines");
+            lines.push(format!("  filled  {of} that no surface fits closed as holes of meshes are"));
+        }
+        if mesh.too_small > 0 {
+            lines.push(format!("  lost    {} too small for single precision", words::triangles(mesh.too_small)));
+        }
+    }
+    for number in left.iter().take(LISTED) {
+        lines.push(format!("  left    outline {number}: {}", problem(filled, *number)));
+    }
+    if left.len() > LISTED {
+        lines.push(format!("  left    {} more; --json has all of them", left.len() - LISTED));
+    }
+    if let Some(mesh) = mesh {
+        let verdict = &mesh.report.verdict;
+        lines.push(format!("  verdict {}: {}", if verdict.good { "good" } else { "not good" }, verdict.statement));
+    }
+    lines.iter().map(|line| plain(line) + "\n").collect()
+}
+
+fn problem(filled: &FilledNetwork, number: usize) -> String {
+    let problem = filled.filled.reports.get(number).and_then(|report| report.problem.as_ref());
+    problem.map_or_else(|| "it has no surface that such a file can hold".into(), ToString::to_string)
+}
+
+/// All of it as one line of JSON.
+fn as_json(args: &FillCurvesArgs, done: &Done) -> Value {
+    let Done { network, filled, left, mesh } = done;
+    let outline = |(number, (outline, report)): (usize, (&fill::Outline, &fill::Report))| {
+        let uses = |uses: &[curves::Use]| -> Vec<Value> {
+            uses.iter().map(|own| json!({ "curve": own.curve, "reversed": own.is_reversed })).collect()
+        };
+        json!({
+            "outer": uses(&outline.outer),
+            "inner": outline.inner.iter().map(|ring| uses(ring)).collect::<Vec<_>>(),
+            "method": name(report.method),
+            "sides": report.sides,
+            "error": report.error,
+            "chord": report.chord,
+            "gap": report.gap,
+            "folded": report.is_folded,
+            "ambiguous": report.is_ambiguous,
+            "problem": report.problem.as_ref().map(ToString::to_string),
+            "left": left.contains(&number),
+        })
+    };
+    let outlines = filled.outlines.iter().zip(&filled.filled.reports).enumerate().map(outline);
+    let paths: [PathBuf; 2] = [args.input.clone(), args.output.clone()];
+    json!({
+        "input": paths[0].to_string_lossy(),
+        "output": paths[1].to_string_lossy(),
+        "unit": network.unit.name,
+        "millimetres": network.unit.millimetres,
+        "outlines": outlines.collect::<Vec<_>>(),
+        "closed_as_holes": mesh.as_ref().map(|mesh| mesh.closed_as_holes.clone()),
+        "mesh": mesh.as_ref().map(|mesh| &mesh.report),
+    })
+}

@@ -1,21 +1,37 @@
 //! Edits chosen and made.
 
-use super::feature::{Feature, Outcome};
+use super::feature::{Feature, Kind, Outcome};
 use super::features::Candidate;
 use super::mesh::{DefeatureError, Mesh};
 use super::reason::Reason;
+use super::remove::guard::{Star, closes};
 use super::remove::pierce::Tree;
-use super::remove::plan::Edit;
-use super::vector::Point;
-use std::collections::BTreeMap;
+use super::remove::plan::{Edit, remade};
+use super::segments::Segments;
+use super::vector::{Point, distance};
+use rayon::prelude::*;
+use std::collections::{BTreeMap, BTreeSet};
+
+/// A triangle that an edit removes, and one that it relies on.
+const GONE: u8 = 2;
+const HELD: u8 = 1;
+
+/// In place of the number in the input: of a triangle that was added, and of one of an edit that added more than it removed.
+const ADDED: u32 = u32::MAX;
+const GROWN: u32 = u32::MAX - 1;
+
+/// The ends of an edge, the lower one first.
+type Ends = [[u64; 3]; 2];
 
 /// The mesh as it is after some rounds.
 pub(crate) struct Work {
     pub(crate) mesh: Mesh,
-    /// Numbers in the input; `u32::MAX` of what was added.
+    /// Numbers in the input; `ADDED` or `GROWN` of what was added.
     origins: Vec<u32>,
     /// Triangles of the input.
     count: usize,
+    /// Kind, centre and size of what was removed.
+    done: Vec<(Kind, Point, f64)>,
 }
 
 /// What a round brought.
@@ -28,20 +44,22 @@ pub(crate) struct Round {
 impl Work {
     pub(crate) fn new(points: Vec<Point>, triangles: Vec<[u32; 3]>) -> Result<Self, DefeatureError> {
         let count = triangles.len();
-        Ok(Self { mesh: Mesh::new(points, triangles)?, origins: (0..count as u32).collect(), count })
+        Ok(Self { mesh: Mesh::new(points, triangles)?, origins: (0..count as u32).collect(), count, done: Vec::new() })
     }
 
     /// Takes edits, in the order of the candidates, that do not meddle with those taken before.
     pub(crate) fn choose(&self, candidates: Vec<Candidate>, plans: Vec<Result<Edit, Reason>>) -> Round {
-        /// A triangle that an edit removes, and one that it relies on.
-        const GONE: u8 = 2;
-        const HELD: u8 = 1;
         let tree = if plans.iter().any(Result::is_ok) { Some(Tree::new(&self.mesh)) } else { None };
+        let pierced = |edit: &Edit| {
+            tree.as_ref().is_some_and(|tree| tree.is_pierced(&self.mesh, edit, |t| edit.removed.binary_search(&t).is_ok()))
+        };
+        let pierced: Vec<bool> = plans.par_iter().map(|plan| plan.as_ref().is_ok_and(pierced)).collect();
         let mut state = vec![0_u8; self.mesh.triangles.len()];
+        let mut edges: BTreeSet<Ends> = BTreeSet::new();
         let mut round = Round { removed: Vec::new(), left: Vec::new(), edits: Vec::new() };
-        for (candidate, plan) in candidates.into_iter().zip(plans) {
-            // Part of a feature that is removed already.
-            if candidate.triangles.iter().any(|t| state[*t as usize] == GONE) {
+        for ((candidate, plan), is_pierced) in candidates.into_iter().zip(plans).zip(pierced) {
+            // Part of a feature that is removed already, or what took the place of one: that would have no end.
+            if candidate.triangles.iter().any(|t| state[*t as usize] == GONE) || self.is_done(&candidate) {
                 continue;
             }
             let edit = match plan {
@@ -51,57 +69,128 @@ impl Work {
                     continue;
                 }
             };
-            let inside = |t: u32| edit.removed.binary_search(&t).is_ok();
-            let halves = || edit.removed.iter().flat_map(|t| 3 * t..3 * t + 3);
-            let rim: Vec<u32> = halves().map(|half| self.mesh.across(half)).filter(|t| !inside(*t)).collect();
-            let is_free = edit.removed.iter().all(|t| state[*t as usize] == 0) && rim.iter().all(|t| state[*t as usize] != GONE);
-            let outcome = if is_free { Ok(()) } else { Err(Reason::Rounds) };
-            let outcome = outcome.and_then(|()| match &tree {
-                Some(tree) if tree.is_pierced(&self.mesh, &edit, inside) => Err(Reason::Pierced),
-                _ => Ok(()),
-            });
+            let outcome = if is_pierced { Err(Reason::Pierced) } else { self.fits(&edit, &state, &edges) };
             match outcome {
-                Ok(()) => {
+                Ok((rim, own)) => {
                     rim.iter().for_each(|t| state[*t as usize] = HELD);
+                    edges.extend(own);
                     edit.removed.iter().for_each(|t| state[*t as usize] = GONE);
                     round.removed.push(self.feature(candidate, Outcome::Removed));
                     round.edits.push(edit);
                 }
-                Err(reason) => round.left.push(self.feature(candidate, Outcome::Left(reason))),
+                Err(reason) => {
+                    // What waits stays whole until its turn comes: a chamfer inside of it is not taken first.
+                    if reason == Reason::Rounds {
+                        candidate.triangles.iter().for_each(|t| state[*t as usize] = HELD.max(state[*t as usize]));
+                    }
+                    round.left.push(self.feature(candidate, Outcome::Left(reason)));
+                }
             }
         }
         round
     }
 
+    /// Whether an edit meddles with none that was taken; then, the triangles beside it and its new edges. Two edits may both
+    /// want an edge between the same two vertices: one of them waits.
+    fn fits(&self, edit: &Edit, state: &[u8], edges: &BTreeSet<Ends>) -> Result<(Vec<u32>, Vec<Ends>), Reason> {
+        let inside = |t: u32| edit.removed.binary_search(&t).is_ok();
+        let halves = edit.removed.iter().flat_map(|t| 3 * t..3 * t + 3);
+        let rim: Vec<u32> = halves.map(|half| self.mesh.across(half)).filter(|t| !inside(*t)).collect();
+        let is_free = edit.removed.iter().all(|t| state[*t as usize] == 0) && rim.iter().all(|t| state[*t as usize] != GONE);
+        let key = |v: u32| edit.at(&self.mesh, v).map(|x| (x + 0.0).to_bits());
+        let ends = |a: u32, b: u32| if key(a) < key(b) { [key(a), key(b)] } else { [key(b), key(a)] };
+        let own: Vec<Ends> = edit.triangles.iter().flat_map(|[a, b, c]| [ends(*a, *b), ends(*b, *c), ends(*c, *a)]).collect();
+        if !is_free || own.iter().any(|ends| edges.contains(ends)) {
+            return Err(Reason::Rounds);
+        }
+        Ok((rim, own))
+    }
+
+    /// Remembers what was removed.
+    pub(crate) fn note(&mut self, removed: &[Feature]) {
+        self.done.extend(removed.iter().map(|f| (f.kind, f.centre, f.size)));
+    }
+
+    /// Whether a feature of this kind, place and size was removed before.
+    fn is_done(&self, candidate: &Candidate) -> bool {
+        let near = |centre: Point, size: f64| {
+            (size - candidate.size).abs() <= 0.01 * size && distance(centre, candidate.centre) <= 0.01 * size
+        };
+        self.done.iter().any(|(kind, centre, size)| *kind == candidate.kind && near(*centre, *size))
+    }
+
     fn feature(&self, candidate: Candidate, outcome: Outcome) -> Feature {
         let mut triangles: Vec<u32> =
-            candidate.triangles.iter().map(|t| self.origins[*t as usize]).filter(|t| *t != u32::MAX).collect();
+            candidate.triangles.iter().map(|t| self.origins[*t as usize]).filter(|t| *t < GROWN).collect();
         triangles.sort_unstable();
         let Candidate { kind, centre, axis, size, length, depth, confidence, .. } = candidate;
         Feature { kind, centre, axis, size, length, depth, confidence, triangles, outcome }
     }
 
-    /// Makes edits; leaves everything as it was where the mesh would not be closed and manifold.
-    pub(crate) fn apply(&mut self, edits: Vec<Edit>) -> Result<(), DefeatureError> {
+    /// Makes edits, and gives the segments of the new mesh; leaves everything as it was where the mesh would not be closed and
+    /// manifold.
+    pub(crate) fn apply(&mut self, edits: &[Edit], segments: &Segments) -> Result<Segments, DefeatureError> {
         let mut is_gone = vec![false; self.mesh.triangles.len()];
         let old = self.mesh.points.len();
         let mut points = self.mesh.points.clone();
-        let mut added: Vec<[u32; 3]> = Vec::new();
+        let (mut added, mut owners, mut joined) = (Vec::new(), Vec::new(), Vec::<(u32, u32)>::new());
+        let mut fresh_origins: Vec<u32> = Vec::new();
         for edit in edits {
             edit.removed.iter().for_each(|t| is_gone[*t as usize] = true);
             let shift = (points.len() - old) as u32;
-            points.extend(edit.fresh);
-            added.extend(edit.triangles.into_iter().map(|t| t.map(|v| if (v as usize) < old { v } else { v + shift })));
+            points.extend(&edit.fresh);
+            added.extend(edit.triangles.iter().map(|t| t.map(|v| if (v as usize) < old { v } else { v + shift })));
+            owners.extend(&edit.owners);
+            let origin = if edit.triangles.len() > edit.removed.len() { GROWN } else { ADDED };
+            fresh_origins.resize(owners.len(), origin);
+            joined.extend(&edit.joined);
         }
-        let kept = || (0..is_gone.len()).filter(|t| !is_gone[*t]);
-        let mut triangles: Vec<[u32; 3]> = kept().map(|t| self.mesh.triangles[t]).collect();
-        let mut origins: Vec<u32> = kept().map(|t| self.origins[t]).collect();
-        origins.resize(origins.len() + added.len(), u32::MAX);
+        joined.sort_unstable();
+        joined.dedup();
+        joined.retain(|(one, other)| segments.continues(&self.mesh, *one, *other));
+        let kept: Vec<u32> = (0..is_gone.len() as u32).filter(|t| !is_gone[*t as usize]).collect();
+        let mut triangles: Vec<[u32; 3]> = kept.iter().map(|t| self.mesh.triangles[*t as usize]).collect();
+        let mut origins: Vec<u32> = kept.iter().map(|t| self.origins[*t as usize]).collect();
+        origins.extend(fresh_origins);
         triangles.extend(added);
         weld(&points, &mut triangles, old);
         self.mesh = Mesh::new(points, triangles)?;
         self.origins = origins;
-        Ok(())
+        Ok(segments.carried(&self.mesh, &kept, &owners, &joined))
+    }
+
+    /// Makes faces anew that edits left with more triangles than they took: vertices of former rims inside of them go.
+    pub(crate) fn tidy(&mut self, segments: &Segments) {
+        let grown = self.origins.iter().zip(&segments.of).filter(|(origin, _)| **origin == GROWN).map(|(_, s)| *s);
+        let mut numbers: Vec<u32> = grown.collect();
+        numbers.sort_unstable();
+        numbers.dedup();
+        if numbers.is_empty() {
+            return;
+        }
+        let star = Star::new(&self.mesh);
+        let remade = |number: &u32| {
+            let edit = remade(&self.mesh, segments, *number)?;
+            closes(&self.mesh, &edit, &star).ok()?;
+            Some(edit)
+        };
+        let mut edits: Vec<Edit> = numbers.par_iter().filter_map(remade).collect();
+        // Two faces may both want an edge between the same two vertices.
+        let mut seen: BTreeSet<(u32, u32)> = BTreeSet::new();
+        edits.retain(|edit| {
+            let sides = edit.triangles.iter().flat_map(|[a, b, c]| [(*a, *b), (*b, *c), (*c, *a)]);
+            let mut own: Vec<(u32, u32)> = sides.map(|(a, b)| (a.min(b), a.max(b))).collect();
+            own.sort_unstable();
+            // Inner edges are there twice.
+            let inner: Vec<(u32, u32)> = own.windows(2).filter(|w| w[0] == w[1]).map(|w| w[0]).collect();
+            let is_free = inner.iter().all(|side| !seen.contains(side));
+            if is_free {
+                seen.extend(inner);
+            }
+            is_free
+        });
+        // Where they do not go together, all stays as it is.
+        let _ = self.apply(&edits, segments);
     }
 
     /// The edit of the input that all rounds together are.

@@ -24,6 +24,9 @@ pub(crate) enum Reason {
     /// The continued faces would meet other surface.
     #[error("the continued faces would pass through another part of the surface")]
     Pierced,
+    /// The surface that goes and the one that comes enclose no volume, or one on the wrong side.
+    #[error("its removal would not change the part")]
+    Unchanged,
     /// An edge would have four faces.
     #[error("an edge would belong to more than two triangles")]
     NotManifold,

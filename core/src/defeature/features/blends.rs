@@ -8,11 +8,11 @@ use super::super::feature::{Kind, Limits};
 use super::super::loops::loops;
 use super::super::mesh::Mesh;
 use super::super::segments::{Segment, Segments};
+use super::super::sets::Sets;
 use super::super::surface::{Surface, radial};
 use super::super::vector::{Point, cross, distance, dot, mean, norm, sub};
 use super::channels::is_convex;
 use super::patch::{Candidate, confidence, direction, extent};
-use super::sets::Sets;
 use super::strip::Strip;
 
 /// Cosine of 4°: supports of a fillet touch it within that.

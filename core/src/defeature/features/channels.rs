@@ -7,10 +7,10 @@
 use super::super::feature::{Kind, Limits};
 use super::super::mesh::Mesh;
 use super::super::segments::{Segment, Segments};
+use super::super::sets::Sets;
 use super::super::surface::Surface;
 use super::super::vector::{Point, cross, dot, mean, scale, sub};
 use super::patch::{Candidate, confidence, extent};
-use super::sets::Sets;
 use crate::defeature::loops::loops;
 
 /// Cosine of 6°: faces that meet in less are smooth.

@@ -6,11 +6,11 @@
 use super::super::loops::loops;
 use super::super::mesh::Mesh;
 use super::super::segments::{Segment, Segments};
+use super::super::sets::Sets;
 use super::super::surface::Surface;
 use super::super::vector::{Point, add, cross, distance, dot, frame, sub};
 use super::channels::is_convex;
 use super::measure::rim;
-use super::sets::Sets;
 
 /// A face with a hole has six triangles at least.
 const LEAST_TRIANGLES: usize = 6;

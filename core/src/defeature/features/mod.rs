@@ -8,7 +8,6 @@ mod channels;
 mod inner;
 mod measure;
 pub(crate) mod patch;
-mod sets;
 mod strip;
 
 pub(crate) use patch::Candidate;
@@ -23,6 +22,8 @@ pub(crate) fn find(mesh: &Mesh, segments: &Segments, limits: &Limits) -> Vec<Can
     let mut found: Vec<Candidate> = pieces.into_iter().filter_map(|piece| patch::classify(mesh, segments, piece)).collect();
     found.extend(channels::find(mesh, segments, limits));
     found.extend(blends::find(mesh, segments, limits));
-    found.retain(|candidate| limits.takes(candidate.kind, candidate.size));
+    // What is as small as rounding is none.
+    let least = 16.0 * mesh.flatness();
+    found.retain(|candidate| candidate.size > least && limits.takes(candidate.kind, candidate.size));
     found
 }

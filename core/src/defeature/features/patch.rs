@@ -46,6 +46,10 @@ pub(super) fn classify(mesh: &Mesh, segments: &Segments, triangles: Vec<u32>) ->
     // Heights over the carrier: a boss is above it everywhere, a hole below.
     let heights = triangles.iter().flat_map(|t| mesh.triangles[*t as usize]).map(|v| side * carrier.surface.distance(mesh.at(v)));
     let (low, high) = heights.fold((0.0_f64, 0.0_f64), |(l, h), x| (l.min(x), h.max(x)));
+    // What stays this near to its face is the face.
+    if rest.is_empty() && high - low <= 8.0 * mesh.flatness() {
+        return None;
+    }
     let slack = 8.0 * mesh.flatness() + 0.02 * (high - low);
     let axis = carrier.outward(first.centre);
     let numbers = segment_numbers(segments, &triangles);

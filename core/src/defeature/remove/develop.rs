@@ -65,6 +65,11 @@ impl Map {
         matches!(self.kind, MapKind::Polar(_))
     }
 
+    /// Whether the surface is a plane.
+    pub(super) fn is_flat(&self) -> bool {
+        self.kind == MapKind::Flat
+    }
+
     /// The image of a point.
     pub(super) fn image(&self, point: Point) -> [f64; 2] {
         let [u, v] = match (self.kind, self.surface) {

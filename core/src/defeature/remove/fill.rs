@@ -2,7 +2,7 @@
 
 use super::super::reason::Reason;
 use super::super::surface::Surface;
-use super::super::vector::{Point, distance};
+use super::super::vector::{Point, between, distance};
 use super::develop::Map;
 use spade::handles::FixedVertexHandle;
 use spade::{ConstrainedDelaunayTriangulation, Point2, Triangulation};
@@ -10,6 +10,9 @@ use std::collections::BTreeMap;
 
 /// Steiner points of one patch.
 const MOST_POINTS: usize = 4_000;
+
+/// Steps of a grid of Steiner points, in the largest turn of the surface's triangles.
+const STEP: f64 = 0.65;
 
 /// Why edges enclose nothing that could be filled.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -42,29 +45,34 @@ pub(super) struct Filling {
 }
 
 /// Fills what lies to the left of directed edges between vertices, seen from outside. `angle`: the largest turn of the surface
-/// in a triangle, radians, for cylinders and cones. O(n log n).
+/// in a triangle, radians, for cylinders and cones. `avoided`: edges that may not be; a point divides them. O(n log n).
 pub(super) fn fill(
     surface: Surface,
     is_concave: bool,
     edges: &[(u32, u32)],
     at: impl Fn(u32) -> Point,
-    angle: f64,
+    (angle, avoided): (f64, &[(u32, u32)]),
 ) -> Result<Filling, Fault> {
     let edges = cancelled(edges)?;
     let mut vertices: Vec<u32> = edges.iter().flat_map(|(a, b)| [*a, *b]).collect();
     vertices.sort_unstable();
     vertices.dedup();
     let points: Vec<Point> = vertices.iter().map(|v| at(*v)).collect();
-    let place = |v: &u32| vertices.binary_search(v).unwrap_or(0);
+    let found = |v: &u32| vertices.binary_search(v).ok();
+    let place = |v: &u32| found(v).unwrap_or(0);
     let local: Vec<(usize, usize)> = edges.iter().map(|(a, b)| (place(a), place(b))).collect();
     let map = Map::new(surface, is_concave, &points, &local).ok_or(Fault::Surface)?;
     let images: Vec<[f64; 2]> = points.iter().map(|p| map.image(*p)).collect();
+    let name = |k: usize| vertices.get(k).copied().unwrap_or(NEW + (k.saturating_sub(vertices.len())) as u32);
+    if let Some(triangles) = lean(&map, surface, &images, &local, angle).filter(|_| avoided.is_empty()) {
+        return Ok(Filling { triangles: triangles.into_iter().map(|t| t.map(name)).collect(), points: Vec::new() });
+    }
     let turns = if map.is_polar() { turns(&images, &local) } else { 0 };
-    let extra = steiner(&map, surface, &images, &local, (turns, angle))?;
+    let mut extra = steiner(&map, surface, &images, &local, (turns, STEP * angle))?;
+    extra.extend(avoided.iter().filter_map(|(a, b)| divided(&map, &points, [found(a)?, found(b)?])));
     let mut flat = images;
     flat.extend(extra.iter().map(|p| map.image(*p)));
     let triangles = inside(&flat, &local)?;
-    let name = |k: usize| vertices.get(k).copied().unwrap_or(NEW + (k.saturating_sub(vertices.len())) as u32);
     Ok(Filling { triangles: triangles.into_iter().map(|t| t.map(name)).collect(), points: extra })
 }
 
@@ -95,6 +103,23 @@ fn turns(images: &[[f64; 2]], edges: &[(usize, usize)]) -> i64 {
         (x * v - y * u).atan2(x * u + y * v)
     };
     (edges.iter().map(angle).sum::<f64>() / std::f64::consts::TAU).round() as i64
+}
+
+/// Triangles of a cylinder's piece without new points: the height is pressed to the width of a step, so that edges run along the
+/// axis, where no chord leaves the surface. `None` of other surfaces, and where a triangle would turn by more than `angle` and by
+/// more than each edge given.
+fn lean(map: &Map, surface: Surface, images: &[[f64; 2]], edges: &[(usize, usize)], angle: f64) -> Option<Vec<[usize; 3]>> {
+    let Surface::Cylinder { radius, .. } = surface else { return None };
+    if map.is_polar() {
+        return None;
+    }
+    let heights = images.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), p| (l.min(p[1]), h.max(p[1])));
+    let press = (radius * angle / (heights.1 - heights.0).max(1e-300)).min(1.0);
+    let pressed: Vec<[f64; 2]> = images.iter().map(|[u, v]| [*u, v * press]).collect();
+    let triangles = inside(&pressed, edges).ok()?;
+    let turn = |a: usize, b: usize| (images[a][0] - images[b][0]).abs();
+    let most = 1.05 * edges.iter().map(|(a, b)| turn(*a, *b)).fold(radius * angle, f64::max);
+    triangles.iter().all(|[a, b, c]| turn(*a, *b).max(turn(*b, *c)).max(turn(*c, *a)) <= most).then_some(triangles)
 }
 
 /// Points on the surface inside of what is filled, where a chord would leave it: a grid of as many steps as the turn asks for;
@@ -143,6 +168,14 @@ fn steiner(
         }
     }
     Ok(found)
+}
+
+/// The middle between two points of a surface, on it; `None` of curved maps that show the whole turn.
+fn divided(map: &Map, points: &[Point], [a, b]: [usize; 2]) -> Option<Point> {
+    let (p, q) = (*points.get(a)?, *points.get(b)?);
+    let ([u, v], [s, t]) = (map.image(p), map.image(q));
+    let middle = if map.is_flat() { Some(between(p, q, 0.5)) } else { map.point([(u + s) / 2.0, (v + t) / 2.0]) };
+    middle.map(super::meet::rounded)
 }
 
 /// Whether edges wind once around a place and none is nearer than `gap`. O(edges).
@@ -233,4 +266,34 @@ fn windings(faces: &[[usize; 3]], edges: &[(usize, usize)]) -> Vec<Option<i32>> 
         }
     }
     found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_band_of_a_cylinder_takes_no_new_points() {
+        // Two arcs of 9 chords of 5° each, 0.3 apart: 18 triangles.
+        let at = |v: u32| {
+            let turn = f64::from(v % 10) * 5.0_f64.to_radians();
+            [4.0 * turn.cos(), 4.0 * turn.sin(), if v < 10 { 0.0 } else { 0.3 }]
+        };
+        let mut edges: Vec<(u32, u32)> = (0..9).map(|k| (k, k + 1)).collect();
+        edges.push((9, 19));
+        edges.extend((10..19).rev().map(|k| (k + 1, k)));
+        edges.push((10, 0));
+        let surface = Surface::Cylinder { origin: [0.0; 3], axis: [0.0, 0.0, 1.0], radius: 4.0 };
+        let filling = fill(surface, false, &edges, at, (5.0_f64.to_radians(), &[])).unwrap();
+        assert_eq!((filling.triangles.len(), filling.points.len()), (18, 0));
+    }
+
+    #[test]
+    fn an_edge_that_may_not_be_is_divided() {
+        let at = |v: u32| [[0.0, 0.0, 1.0], [2.0, 0.0, 1.0], [2.0, 2.0, 1.0], [0.0, 2.0, 1.0]][v as usize % 4];
+        let plane = Surface::Plane { normal: [0.0, 0.0, 1.0], offset: 1.0 };
+        let edges = [(0, 1), (1, 2), (2, 3), (3, 0)];
+        let filling = fill(plane, false, &edges, at, (0.4, &[(0, 2)])).unwrap();
+        assert_eq!((filling.triangles.len(), filling.points), (4, vec![[1.0, 1.0, 1.0]]));
+    }
 }

@@ -4,8 +4,10 @@ use super::super::features::patch::Candidate;
 use super::super::mesh::Mesh;
 use super::super::reason::Reason;
 use super::super::segments::Segments;
+use super::super::sets::Sets;
 use super::super::vector::{Point, distance, dot, mean, sub};
 use super::plan::{Edit, Plan};
+use super::trial::Trial;
 use std::collections::BTreeMap;
 
 /// Ends of strips that touch: each set becomes one point.
@@ -17,7 +19,7 @@ struct Joints {
 }
 
 /// Plans the removal of a network. O(n log n) in its rims.
-pub(crate) fn plan(mesh: &Mesh, segments: &Segments, candidate: &Candidate, reach: f64, is_anew: bool) -> Result<Edit, Reason> {
+pub(crate) fn plan(mesh: &Mesh, segments: &Segments, candidate: &Candidate, reach: f64, trial: &Trial) -> Result<Edit, Reason> {
     let mut plan = Plan::new(mesh, segments, reach);
     let mut runs = Vec::new();
     for rim in &candidate.loops {
@@ -39,21 +41,18 @@ pub(crate) fn plan(mesh: &Mesh, segments: &Segments, candidate: &Candidate, reac
         let way = way(mesh, &mut plan, &strip.rims, [one, other], ends)?;
         plan.along(one, other, &way);
     }
-    plan.finish(&candidate.triangles, is_anew)
+    plan.finish(&candidate.triangles, trial)
 }
 
 /// Ends that share vertices, directly or over corner pieces.
 fn joints(mesh: &Mesh, segments: &Segments, candidate: &Candidate) -> Joints {
     let count = candidate.strips.len() * 2;
-    let mut of: Vec<usize> = (0..count).collect();
-    let is_strip = |s: u32| candidate.strips.iter().any(|strip| strip.segment == s);
+    let mut sets = Sets::new(count);
+    let mut strips: Vec<u32> = candidate.strips.iter().map(|strip| strip.segment).collect();
+    strips.sort_unstable();
     // Each vertex of an end, and each corner piece across it, belongs to the joint.
     let mut by_key: BTreeMap<(bool, u32), usize> = BTreeMap::new();
-    let mut join = |of: &mut Vec<usize>, key: (bool, u32), end: usize| {
-        let other = *by_key.entry(key).or_insert(end);
-        let (a, b) = (of[other], of[end]);
-        of.iter_mut().filter(|j| **j == a.max(b)).for_each(|j| *j = a.min(b));
-    };
+    let mut join = |key: (bool, u32), end: usize| sets.join(*by_key.entry(key).or_insert(end) as u32, end as u32);
     let inside = |t: u32| candidate.triangles.binary_search(&t).is_ok();
     for (number, strip) in candidate.strips.iter().enumerate() {
         for side in 0..2 {
@@ -61,16 +60,17 @@ fn joints(mesh: &Mesh, segments: &Segments, candidate: &Candidate) -> Joints {
                 let end = 2 * number + side;
                 let across = mesh.across(*half);
                 if inside(across) {
-                    join(&mut of, (false, mesh.from(*half)), end);
-                    join(&mut of, (false, mesh.to(*half)), end);
+                    join((false, mesh.from(*half)), end);
+                    join((false, mesh.to(*half)), end);
                     let piece = segments.of[across as usize];
-                    if !is_strip(piece) {
-                        join(&mut of, (true, piece), end);
+                    if strips.binary_search(&piece).is_err() {
+                        join((true, piece), end);
                     }
                 }
             }
         }
     }
+    let of: Vec<usize> = (0..count as u32).map(|end| sets.root(end) as usize).collect();
     let mut at = BTreeMap::new();
     for (number, strip) in candidate.strips.iter().enumerate() {
         for side in 0..2 {

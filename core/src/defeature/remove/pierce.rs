@@ -1,7 +1,7 @@
 //! Whether new triangles would pass through surface that stays.
 
 use super::super::mesh::Mesh;
-use super::super::vector::Point;
+use super::super::vector::{self, Point, dot, sub, unit};
 use super::plan::Edit;
 use robust::{Coord3D, orient3d};
 
@@ -47,15 +47,14 @@ impl Tree {
 
     /// Whether a new triangle of an edit crosses one that stays and shares no corner with it.
     pub(crate) fn is_pierced(&self, mesh: &Mesh, edit: &Edit, removed: impl Fn(u32) -> bool) -> bool {
-        let at = |v: u32| match (v as usize).checked_sub(mesh.points.len()) {
-            Some(k) => edit.fresh.get(k).copied().unwrap_or([0.0; 3]),
-            None => mesh.at(v),
-        };
+        let at = |v: u32| edit.at(mesh, v);
         edit.triangles.iter().any(|triangle| {
             let corners = triangle.map(at);
             let hits = |other: u32| {
                 let its = mesh.triangles[other as usize];
-                !removed(other) && !its.iter().any(|v| triangle.contains(v)) && cross(corners, its.map(|v| mesh.at(v)))
+                !removed(other)
+                    && !its.iter().any(|v| triangle.contains(v))
+                    && cross(corners, its.map(|v| mesh.at(v)), 0.5 * mesh.flatness())
             };
             self.any(around(corners), hits)
         })
@@ -95,9 +94,16 @@ fn overlap([a, b]: Box3, [c, d]: Box3) -> bool {
     (0..3).all(|k| a[k] <= d[k] && c[k] <= b[k])
 }
 
-/// Whether an edge of one triangle passes through the inside of the other; exact.
-fn cross(one: [Point; 3], other: [Point; 3]) -> bool {
-    pierces(one, other) || pierces(other, one)
+/// Whether an edge of one triangle passes through the inside of the other; exact, but for triangles that both lie within a
+/// layer: neighbours in one plane, where only rounding crosses.
+fn cross(one: [Point; 3], other: [Point; 3], layer: f64) -> bool {
+    !is_level(one, other, layer) && (pierces(one, other) || pierces(other, one))
+}
+
+/// Whether a triangle lies within a distance of another one's plane.
+fn is_level(corners: [Point; 3], [a, b, c]: [Point; 3], layer: f64) -> bool {
+    let normal = unit(vector::cross(sub(b, a), sub(c, a)));
+    normal.is_some_and(|normal| corners.iter().all(|p| dot(normal, sub(*p, a)).abs() <= layer))
 }
 
 fn pierces(edges: [Point; 3], triangle: [Point; 3]) -> bool {
@@ -125,7 +131,7 @@ mod tests {
     fn a_needle_through_a_triangle_crosses_it_and_one_beside_does_not() {
         let flat = [[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0]];
         let needle = |x: f64| [[x, 1.0, -1.0], [x, 1.0, 1.0], [x + 0.1, 1.0, 1.0]];
-        assert!(cross(flat, needle(1.0)) && cross(needle(1.0), flat));
-        assert!(!cross(flat, needle(5.0)));
+        assert!(cross(flat, needle(1.0), 1e-6) && cross(needle(1.0), flat, 1e-6));
+        assert!(!cross(flat, needle(5.0), 1e-6));
     }
 }

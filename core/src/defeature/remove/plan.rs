@@ -11,6 +11,7 @@ use super::super::surface::{Surface, radial};
 use super::super::vector::{Point, cross, distance, dot, mean, sub, unit};
 use super::fill::{self, Fault, Filling, fill};
 use super::meet;
+use super::trial::Trial;
 
 /// Carriers of one patch.
 const MOST_CARRIERS: usize = 64;
@@ -31,7 +32,21 @@ pub(crate) struct Carrier {
 pub(crate) struct Edit {
     pub(crate) removed: Vec<u32>,
     pub(crate) triangles: Vec<[u32; 3]>,
+    /// The segment that goes on in each new triangle.
+    pub(crate) owners: Vec<u32>,
+    /// Segments that are one from now on if all of the second one lies on the first one's surface.
+    pub(crate) joined: Vec<(u32, u32)>,
     pub(crate) fresh: Vec<Point>,
+}
+
+impl Edit {
+    /// The position of an old or new vertex.
+    pub(crate) fn at(&self, mesh: &Mesh, vertex: u32) -> Point {
+        match (vertex as usize).checked_sub(mesh.points.len()) {
+            Some(k) => self.fresh.get(k).copied().unwrap_or([0.0; 3]),
+            None => mesh.at(vertex),
+        }
+    }
 }
 
 /// The plan of one removal.
@@ -213,15 +228,18 @@ impl<'a> Plan<'a> {
     }
 
     /// Fills what the edges of each carrier enclose. Flat carriers that become smaller are made anew as a whole; with
-    /// `is_anew`, all flat ones are.
-    pub(crate) fn finish(mut self, patch: &[u32], is_anew: bool) -> Result<Edit, Reason> {
+    /// `trial.is_anew`, all flat ones are.
+    pub(crate) fn finish(mut self, patch: &[u32], trial: &Trial) -> Result<Edit, Reason> {
         let mut removed = patch.to_vec();
-        let mut triangles = Vec::new();
+        let (mut triangles, mut owners) = (Vec::new(), Vec::new());
         for number in 0..self.carriers.len() {
-            let is_whole = is_anew && self.carriers[number].surface.is_plane() && !self.carriers[number].edges.is_empty();
-            let filled = if is_whole { self.rebuild(number, &mut removed) } else { self.fill(number) };
+            let is_whole = trial.is_anew && self.carriers[number].surface.is_plane() && !self.carriers[number].edges.is_empty();
+            let filled = if is_whole { self.rebuild(number, &mut removed, trial) } else { self.fill(number, trial) };
             let filled = filled.or_else(|fault| match fault {
-                Fault::Sense | Fault::Crossing if !is_whole => self.rebuild(number, &mut removed),
+                Fault::Sense | Fault::Crossing if !is_whole && self.carriers[number].surface.is_plane() => {
+                    self.rebuild(number, &mut removed, trial)
+                }
+                Fault::Crossing if !is_whole => Err(Fault::Sense),
                 _ => Err(fault),
             });
             let filled = filled.map_err(Reason::from)?;
@@ -229,14 +247,20 @@ impl<'a> Plan<'a> {
             self.fresh.extend(filled.points);
             let name = |v: u32| if v >= fill::NEW { first + (v - fill::NEW) } else { v };
             triangles.extend(filled.triangles.into_iter().map(|t| t.map(name)));
+            owners.resize(triangles.len(), self.carriers[number].segments.first().copied().unwrap_or(0));
         }
-        let edit = Edit { removed, triangles, fresh: self.fresh };
-        Ok(edit)
+        let pairs = |carrier: &Carrier| {
+            let first = carrier.segments.first().copied();
+            carrier.segments.iter().skip(1).filter_map(|s| first.map(|f| (f, *s))).collect::<Vec<_>>()
+        };
+        let joined = self.carriers.iter().flat_map(pairs).collect();
+        Ok(Edit { removed, triangles, owners, joined, fresh: self.fresh })
     }
 
-    fn fill(&self, number: usize) -> Result<Filling, Fault> {
+    fn fill(&self, number: usize, trial: &Trial) -> Result<Filling, Fault> {
         let carrier = &self.carriers[number];
-        let filling = fill(carrier.surface, carrier.is_concave, &carrier.edges, |v| self.at(v), carrier.turn.max(0.02) * 0.65)?;
+        let limits = (carrier.turn.max(0.03), &trial.avoided[..]);
+        let filling = fill(carrier.surface, carrier.is_concave, &carrier.edges, |v| self.at(v), limits)?;
         let at = |v: u32| match v.checked_sub(fill::NEW) {
             Some(k) => filling.points.get(k as usize).copied().unwrap_or([0.0; 3]),
             None => self.at(v),
@@ -252,12 +276,9 @@ impl<'a> Plan<'a> {
         if carrier.surface.is_plane() || filling.triangles.iter().all(faces) { Ok(filling) } else { Err(Fault::Surface) }
     }
 
-    /// Fills a flat carrier's segments and its new piece together.
-    fn rebuild(&mut self, number: usize, removed: &mut Vec<u32>) -> Result<Filling, Fault> {
+    /// Fills a carrier's segments and its new piece together.
+    fn rebuild(&mut self, number: usize, removed: &mut Vec<u32>, trial: &Trial) -> Result<Filling, Fault> {
         let carrier = &self.carriers[number];
-        if !carrier.surface.is_plane() {
-            return Err(Fault::Sense);
-        }
         let mut added = Vec::new();
         let mut gone = Vec::new();
         for segment in &carrier.segments {
@@ -271,21 +292,48 @@ impl<'a> Plan<'a> {
             }
         }
         self.carriers[number].edges.extend(added);
-        let filling = self.fill(number)?;
+        let filling = self.fill(number, trial)?;
         removed.extend(gone);
         Ok(filling)
     }
 }
 
+/// A flat or cylindrical face within its outline, without the vertices inside that former rims left; `None` where that makes no
+/// fewer triangles. O(n log n).
+pub(crate) fn remade(mesh: &Mesh, segments: &Segments, number: u32) -> Option<Edit> {
+    let segment = &segments.list[number as usize];
+    if !matches!(segment.surface, Surface::Plane { .. } | Surface::Cylinder { .. }) {
+        return None;
+    }
+    let mut plan = Plan::new(mesh, segments, 0.0);
+    let carrier = plan.carrier(number, mesh.centroid(*segment.triangles.first()?)).ok()?;
+    let mut removed = Vec::new();
+    let filling = plan.rebuild(carrier, &mut removed, &Trial::default()).ok()?;
+    removed.sort_unstable();
+    let most = 1.05 * turn(mesh, segment);
+    let turns = |t: &[u32; 3]| largest_turn(segment, t.map(|v| mesh.at(v)));
+    let is_round = segment.surface.axis().is_some();
+    let is_good = filling.points.is_empty() && filling.triangles.len() < removed.len();
+    if !is_good || (is_round && filling.triangles.iter().any(|t| turns(t) > most)) {
+        return None;
+    }
+    let owners = vec![number; filling.triangles.len()];
+    Some(Edit { removed, triangles: filling.triangles, owners, joined: Vec::new(), fresh: Vec::new() })
+}
+
 /// The largest turn of a segment's triangles around its axis, radians; of 2,000 triangles at most.
 fn turn(mesh: &Mesh, segment: &Segment) -> f64 {
-    let Some((origin, axis)) = segment.surface.axis() else { return 0.4 };
-    let mut most = 0.0_f64;
-    for triangle in segment.triangles.iter().take(2_000) {
-        let away = mesh.triangles[*triangle as usize].map(|v| unit(radial(origin, axis, mesh.at(v))).unwrap_or([0.0; 3]));
-        for (a, b) in [(0, 1), (1, 2), (2, 0)] {
-            most = most.max(dot(away[a], away[b]).clamp(-1.0, 1.0).acos());
-        }
+    if segment.surface.axis().is_none() {
+        return 0.4;
     }
-    most.clamp(0.01, 0.85)
+    let triangles = segment.triangles.iter().take(2_000).map(|t| mesh.triangles[*t as usize].map(|v| mesh.at(v)));
+    triangles.map(|corners| largest_turn(segment, corners)).fold(0.0, f64::max).clamp(0.01, 0.85)
+}
+
+/// The largest turn of an edge of a triangle around a segment's axis, radians.
+fn largest_turn(segment: &Segment, corners: [Point; 3]) -> f64 {
+    let Some((origin, axis)) = segment.surface.axis() else { return 0.0 };
+    let away = corners.map(|p| unit(radial(origin, axis, p)).unwrap_or([0.0; 3]));
+    let turn = |(a, b): (usize, usize)| dot(away[a], away[b]).clamp(-1.0, 1.0).acos();
+    [(0, 1), (1, 2), (2, 0)].into_iter().map(turn).fold(0.0, f64::max)
 }

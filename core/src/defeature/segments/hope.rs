@@ -5,10 +5,11 @@ use super::super::vector::{cross, unit};
 use super::rounds::{Hope, Rounds};
 use super::start;
 use rayon::prelude::*;
+use std::ops::Range;
 
-/// What a search from each facet may find: most facets of scans are told apart by a look at their neighbours.
-pub(super) fn hopes(rounds: &Rounds<'_>) -> Vec<Hope> {
-    (0..rounds.facets.count() as u32).into_par_iter().map(|seed| hope(rounds, seed)).collect()
+/// What a search from each of some facets may find: most facets of scans are told apart by a look at their neighbours.
+pub(super) fn hopes(rounds: &Rounds<'_>, seeds: Range<u32>) -> Vec<Hope> {
+    seeds.into_par_iter().map(|seed| if rounds.is_free(seed) { hope(rounds, seed) } else { Hope::None }).collect()
 }
 
 fn hope(rounds: &Rounds<'_>, seed: u32) -> Hope {

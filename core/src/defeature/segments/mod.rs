@@ -11,6 +11,7 @@ mod rounds;
 mod start;
 
 use super::mesh::Mesh;
+use super::sets::Sets;
 use super::surface::Surface;
 use super::vector::{Point, distance, dot};
 use facets::Facets;
@@ -45,9 +46,7 @@ impl Segments {
         let facets = Facets::new(mesh);
         let mut segments = Self { of: vec![u32::MAX; mesh.triangles.len()], list: Vec::new() };
         let mut taken = vec![false; facets.count()];
-        let search = rounds::Rounds::new(mesh, &facets);
-        let hopes = hope::hopes(&search);
-        for round in search.find(hopes) {
+        for round in rounds::Rounds::new(mesh, &facets).find(hope::hopes) {
             let triangles: Vec<u32> = round.facets.iter().flat_map(|f| facets.triangles(*f)).copied().collect();
             round.facets.iter().for_each(|f| taken[*f as usize] = true);
             segments.add(mesh, (round.surface, round.is_concave), triangles, round.residual);
@@ -99,6 +98,56 @@ impl Segments {
                 }
             }
         }
+    }
+
+    /// Whether all of a segment lies on the surface of another one, within twice the tolerance of both.
+    pub(crate) fn continues(&self, mesh: &Mesh, first: u32, other: u32) -> bool {
+        let surface = self.list[first as usize].surface;
+        let mut vertices = self.list[other as usize].triangles.iter().flat_map(|t| mesh.triangles[*t as usize]);
+        vertices.all(|v| surface.distance(mesh.at(v)).abs() <= 8.0 * mesh.flatness())
+    }
+
+    /// The segments of a mesh behind edits: `kept` are the numbers that its first triangles had, the others belong to `owners`.
+    /// Pairs that are `joined` become one. O(n).
+    pub(crate) fn carried(&self, mesh: &Mesh, kept: &[u32], owners: &[u32], joined: &[(u32, u32)]) -> Self {
+        let mut sets = Sets::new(self.list.len());
+        joined.iter().for_each(|(one, other)| sets.join(*one, *other));
+        let roots: Vec<u32> = (0..self.list.len() as u32).map(|s| sets.root(s)).collect();
+        let empty = |s: &Segment| Segment {
+            surface: s.surface,
+            is_concave: s.is_concave,
+            triangles: Vec::new(),
+            area: 0.0,
+            residual: 0.0,
+        };
+        let mut list: Vec<Segment> = self.list.iter().map(empty).collect();
+        // The largest piece's surface is that of all.
+        let mut largest: Vec<f64> = vec![0.0; list.len()];
+        for (segment, root) in self.list.iter().zip(&roots) {
+            let place = &mut list[*root as usize];
+            place.residual = place.residual.max(segment.residual);
+            if segment.area > largest[*root as usize] {
+                largest[*root as usize] = segment.area;
+                place.surface = segment.surface;
+            }
+        }
+        let before = kept.iter().map(|t| self.of[*t as usize]).chain(owners.iter().copied());
+        let mut of: Vec<u32> = before.map(|s| roots[s as usize]).collect();
+        for (triangle, number) in of.iter().enumerate() {
+            let place = &mut list[*number as usize];
+            place.triangles.push(triangle as u32);
+            place.area += mesh.areas[triangle];
+            if triangle >= kept.len() {
+                let far = mesh.triangles[triangle].map(|v| place.surface.distance(mesh.at(v)).abs());
+                place.residual = far.into_iter().fold(place.residual, f64::max);
+            }
+        }
+        let mut names = vec![0; list.len()];
+        let there = names.iter_mut().zip(&list).filter(|(_, segment)| !segment.triangles.is_empty());
+        (0_u32..).zip(there).for_each(|(number, (name, _))| *name = number);
+        of.iter_mut().for_each(|s| *s = names[*s as usize]);
+        list.retain(|segment| !segment.triangles.is_empty());
+        Self { of, list }
     }
 
     fn add(&mut self, mesh: &Mesh, (surface, is_concave): (Surface, bool), triangles: Vec<u32>, residual: f64) {

@@ -9,6 +9,7 @@ use super::super::vector::{Point, add, cross, distance, dot, norm, scale, sub, u
 use super::facets::Facets;
 use super::fit::{refine, worst};
 use super::start;
+use std::ops::Range;
 
 /// Cosine of the largest angle between neighbouring facets: 46.5°.
 const COS_SMOOTH: f64 = 0.688;
@@ -20,11 +21,13 @@ const SAGITTA: f64 = 0.083;
 const MOST_SHARE: f64 = 0.62;
 /// Fits of a region that still grows.
 const ROUNDS: usize = 8;
-/// Seeds that may fail to be part of a torus before none is tried any more: the bound of the work on scans.
-const FAILED_TORI: usize = 10_000;
-
-/// Seeds in vain, or for little, before the search ends: what scans cost. The largest facets come first.
-const FAILED_SEEDS: usize = 20_000;
+/// Seeds that may fail to be part of a torus before none is tried any more, and as many more as half of the facets of regions
+/// that were found: the bound of the work on scans.
+const FAILED_TORI: usize = 2_000;
+/// Seeds in vain, or for little, before the search ends, and as many more: what scans cost. The largest facets come first.
+const FAILED_SEEDS: usize = 4_000;
+/// Facets that are looked at in one go.
+const LOOK: u32 = 8_192;
 /// Facets of a region that is little.
 const LITTLE: usize = 12;
 
@@ -70,6 +73,10 @@ pub(super) struct Rounds<'a> {
     stamp: u32,
     tolerance: f64,
     failed_tori: usize,
+    /// Seeds that were in vain, or for little.
+    failed: usize,
+    /// Half of the facets of other regions.
+    explained: usize,
 }
 
 impl<'a> Rounds<'a> {
@@ -85,32 +92,41 @@ impl<'a> Rounds<'a> {
             stamp: 0,
             tolerance,
             failed_tori: 0,
+            failed: 0,
+            explained: 0,
         }
     }
 
-    /// All regions, from the largest facets on. O(n) for regions that are found, O(1) for a seed that fails.
-    pub(super) fn find(mut self, mut hopes: Vec<Hope>) -> Vec<Round> {
+    /// All regions, from the largest facets on. `look` tells what facets may be part of. O(n) for regions that are found, O(1)
+    /// for a seed that fails.
+    pub(super) fn find(mut self, look: impl Fn(&Self, Range<u32>) -> Vec<Hope>) -> Vec<Round> {
         let mut found = Vec::new();
-        let mut failed = 0;
+        let mut hopes: Vec<Hope> = Vec::new();
+        let count = self.facets.count() as u32;
         // Regions of few facets may be chance, and come last.
         for least in [6, 3] {
-            for seed in 0..self.facets.count() as u32 {
-                if failed >= FAILED_SEEDS {
+            for seed in 0..count {
+                if self.failed >= FAILED_SEEDS + self.explained {
                     return found;
                 }
-                if self.taken[seed as usize] != FREE || hopes[seed as usize] == Hope::None {
-                    continue;
+                if hopes.len() <= seed as usize {
+                    hopes.extend(look(&self, seed..count.min(seed + LOOK)));
                 }
-                if hopes[seed as usize] == Hope::Torus && self.failed_tori >= FAILED_TORI {
+                let hope = hopes[seed as usize];
+                let is_hopeless = hope == Hope::None || (hope == Hope::Torus && !self.tries_tori());
+                if is_hopeless || !self.is_free(seed) {
                     continue;
                 }
                 let Some(round) = self.best(seed) else {
-                    failed += 1;
+                    self.failed += 1;
                     hopes[seed as usize] = Hope::None;
                     continue;
                 };
-                failed += usize::from(round.facets.len() < LITTLE || round.residual > 2.0 * self.rounding());
-                if round.facets.len() < least {
+                let size = round.facets.len();
+                let is_exact = round.residual <= 2.0 * self.rounding();
+                self.failed += usize::from(!is_exact || size < LITTLE);
+                self.explained += if is_exact { size / 2 } else { 0 };
+                if size < least {
                     continue;
                 }
                 round.facets.iter().for_each(|facet| self.taken[*facet as usize] = found.len() as u32);
@@ -119,6 +135,15 @@ impl<'a> Rounds<'a> {
             }
         }
         found
+    }
+
+    /// Whether a facet belongs to no region yet.
+    pub(super) fn is_free(&self, facet: u32) -> bool {
+        self.taken[facet as usize] == FREE
+    }
+
+    fn tries_tori(&self) -> bool {
+        self.failed_tori < FAILED_TORI + self.explained
     }
 
     /// The largest region around a seed; among equal ones the simplest surface.
@@ -154,7 +179,7 @@ impl<'a> Rounds<'a> {
             }
         }
         offer(&mut best, self.sphere(seed, &near));
-        if self.failed_tori < FAILED_TORI {
+        if self.tries_tori() {
             let torus = self.torus(seed, 14);
             let is_lost = torus.is_none();
             offer(&mut best, torus);

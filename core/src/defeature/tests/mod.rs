@@ -137,6 +137,23 @@ fn a_mesh_with_a_rim_is_refused() {
     assert_eq!(defeature(&[], &[], &ALL).unwrap(), Removed::default());
 }
 
+#[test]
+fn a_smooth_body_has_no_features() {
+    // A wavy ball of latitudes and longitudes, uneven as scans are: patches of it are nearly flat, none is a slot.
+    let part = parts::ball(120, |[x, y, z]: [f64; 3]| 50.0 * (1.0 + 0.1 * (3.1 * x + 1.0).sin() * (2.3 * y + 2.0 * z).cos()));
+    assert_eq!(defeature(&part.points, &part.triangles, &ALL).unwrap(), Removed::default());
+}
+
+#[test]
+fn what_was_removed_is_not_found_again() {
+    let part = parts::stepped([30.0, 20.0, 5.0], &parts::circle([12.0, 9.0], 1.0, 24), -2.0);
+    let left = apply(&part, &defeature(&part.points, &part.triangles, &ALL).unwrap());
+    let points: Vec<[f32; 3]> = left.iter().flatten().copied().collect();
+    let place = |p: &[f32; 3]| points.iter().position(|q| q == p).map_or(0, |k| k as u32);
+    let triangles: Vec<[u32; 3]> = left.iter().map(|t| [place(&t[0]), place(&t[1]), place(&t[2])]).collect();
+    assert_eq!(defeature(&points, &triangles, &ALL).unwrap(), Removed::default());
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(48))]
 

@@ -144,3 +144,28 @@ fn fill(outlines: &[Outline]) -> Vec<[[f64; 2]; 3]> {
     let corners = mesh.inner_faces().map(|face| face.vertices().map(|v| [v.position().x, v.position().y]));
     corners.filter(|[a, b, c]| is_inside((a[0] + b[0] + c[0]) / 3.0, (a[1] + b[1] + c[1]) / 3.0)).collect()
 }
+
+/// A ball around the origin of `n` latitudes and `2 n` longitudes; `far` is the distance of a direction's point.
+pub(super) fn ball(n: u32, far: impl Fn([f64; 3]) -> f64) -> Part {
+    let point = |row: u32, column: u32| {
+        // Columns lean, so that no four neighbours are symmetric.
+        let (s, t) =
+            (f64::from(row) / f64::from(n), f64::from(column) / f64::from(n) + 0.37 / f64::from(n) * f64::from(row).sin());
+        let [lat, lon] = [s, t].map(|x| x * std::f64::consts::PI);
+        let way = [lat.sin() * lon.cos(), lat.sin() * lon.sin(), lat.cos()];
+        way.map(|x| (x * far(way)) as f32)
+    };
+    let mut points = vec![point(0, 0)];
+    points.extend((1..n).flat_map(|row| (0..2 * n).map(move |column| (row, column))).map(|(row, column)| point(row, column)));
+    points.push(point(n, 0));
+    let at = |row: u32, column: u32| match row {
+        0 => 0,
+        _ if row == n => 1 + (n - 1) * 2 * n,
+        _ => 1 + (row - 1) * 2 * n + column % (2 * n),
+    };
+    let quad =
+        |row: u32, k: u32| [[at(row, k), at(row + 1, k), at(row + 1, k + 1)], [at(row, k), at(row + 1, k + 1), at(row, k + 1)]];
+    let all = (0..n).flat_map(|row| (0..2 * n).map(move |k| (row, k))).flat_map(|(row, k)| quad(row, k));
+    let triangles = all.filter(|[a, b, c]| a != b && b != c && c != a).collect();
+    Part { points, triangles, ..Part::default() }
+}

@@ -1,7 +1,6 @@
 //! `suture fill-curves`: surfaces between curves of CAD programs, as a mesh or as surfaces.
 
 use std::collections::BTreeMap;
-use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
@@ -11,6 +10,7 @@ use suture_core::words::{self, Counted};
 use suture_core::{CurveMesh, OutputFormat, Quiet};
 
 use crate::cli::meshes::FillCurvesArgs;
+use crate::create;
 use crate::draft::Draft;
 use crate::exit::Exit;
 use crate::fsx;
@@ -96,39 +96,46 @@ fn write(
     network: &Network,
     filled: &FilledNetwork,
 ) -> Result<(Vec<usize>, Option<CurveMesh>), String> {
-    let (output, shown) = (&args.output, args.output.display());
-    let failed = |error: std::io::Error| format!("{shown}: cannot be written: {error}");
+    match kind {
+        Kind::Mesh(format) => write_mesh(args, format, network, filled).map(|mesh| (mesh.open.clone(), Some(mesh))),
+        Kind::Iges | Kind::Step => write_surfaces(args, kind, network, filled).map(|left| (left, None)),
+    }
+}
+
+fn write_mesh(
+    args: &FillCurvesArgs,
+    format: OutputFormat,
+    network: &Network,
+    filled: &FilledNetwork,
+) -> Result<CurveMesh, String> {
+    let output = &args.output;
+    let failed = |error: std::io::Error| format!("{}: cannot be written: {error}", output.display());
     let draft = Draft::new(fsx::folder_of(output)).map_err(failed)?;
-    let done = match kind {
-        Kind::Mesh(format) => {
-            let mut limits = args.spend.limits(false);
-            limits.spool.get_or_insert_with(|| fsx::folder_of(output).to_owned());
-            let of = (args.input.as_path(), &filled.filled, network.unit.millimetres);
-            let mesh = suture_core::write_curve_mesh(of, (&draft.path(), format), &limits, &Quiet);
-            let mesh = mesh.map_err(|error| error.to_string())?;
-            (mesh.open.clone(), Some(mesh))
-        }
-        Kind::Iges | Kind::Step => {
-            let (body, left) = fill::body(&filled.shapes(network), &filled.outlines, &filled.filled, &network.unit);
-            let name = args.input.file_stem().unwrap_or_default().to_string_lossy();
-            let header = export::Header { name: &name, time: None, system: concat!("Suture ", env!("CARGO_PKG_VERSION")) };
-            let file = std::fs::OpenOptions::new().write(true).open(draft.path()).map_err(failed)?;
-            let mut sink = BufWriter::new(file);
-            let written = if kind == Kind::Iges {
-                export::write_iges(&body, &header, &mut sink)
-            } else {
-                export::write_step(&body, &header, &mut sink)
-            };
-            written.map_err(|error| format!("{shown}: {error}"))?;
-            sink.flush().map_err(failed)?;
-            (left, None)
-        }
-    };
+    let mut limits = args.spend.limits(false);
+    limits.spool.get_or_insert_with(|| fsx::folder_of(output).to_owned());
+    let of = (args.input.as_path(), &filled.filled, network.unit.millimetres);
+    let mesh = suture_core::write_curve_mesh(of, (&draft.path(), format), &limits, &Quiet).map_err(|error| error.to_string())?;
     draft.sync().map_err(failed)?;
     let rights = Rights::of(&std::fs::metadata(&args.input).map_err(failed)?);
     draft.place(output, rights, args.force).map_err(failed)?;
     fsx::sync_dir(fsx::folder_of(output)).map_err(failed)?;
-    Ok(done)
+    Ok(mesh)
+}
+
+fn write_surfaces(args: &FillCurvesArgs, kind: Kind, network: &Network, filled: &FilledNetwork) -> Result<Vec<usize>, String> {
+    let shown = args.output.display();
+    let (body, left) = fill::body(&filled.shapes(network), &filled.outlines, &filled.filled, &network.unit);
+    let name = args.input.file_stem().unwrap_or_default().to_string_lossy();
+    let header = export::Header { name: &name, time: None, system: concat!("Suture ", env!("CARGO_PKG_VERSION")) };
+    let mut text = Vec::new();
+    let written = if kind == Kind::Iges {
+        export::write_iges(&body, &header, &mut text)
+    } else {
+        export::write_step(&body, &header, &mut text)
+    };
+    written.map_err(|error| format!("{shown}: {error}"))?;
+    create::place(&args.output, &text, args.force).map_err(|error| format!("{shown}: cannot be written: {error}"))?;
+    Ok(left)
 }
 
 /// The name of a method for people.

@@ -34,6 +34,7 @@ mod stream;
 mod submesh;
 #[cfg(test)]
 mod testing;
+pub mod toolpath;
 mod topology;
 mod util;
 

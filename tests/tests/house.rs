@@ -15,11 +15,12 @@ use std::path::{Path, PathBuf};
 use imports::Imports;
 
 /// The folders of the engine, each of which may import those before it, and only those.
-const ROOMS: [&str; 16] = [
+const ROOMS: [&str; 17] = [
     "util",
     "contract",
     "curves",
     "defeature",
+    "toolpath",
     "attributes",
     "io",
     "geometry",

@@ -20,5 +20,6 @@ mod step;
 pub mod vector;
 
 pub use finding::Finding;
+pub(crate) use finding::Findings;
 pub use network::{Face, Network, ReadError, Unit, Use};
 pub use read::read;

@@ -1,7 +1,5 @@
 //! `suture convert`: one mesh in another format.
 
-use std::path::Path;
-
 use suture_core::report::{Converted, FileFacts};
 use suture_core::{OutputFormat, Quiet, words};
 
@@ -10,7 +8,6 @@ use crate::draft::Draft;
 use crate::exit::Exit;
 use crate::fsx;
 use crate::naming;
-use crate::rights::Rights;
 use crate::say::{complain, plain, print};
 use crate::table::format_name;
 use crate::units::{WRITTEN, show_size};
@@ -48,12 +45,6 @@ fn convert(args: &ConvertArgs) -> Result<Converted, String> {
     let mut limits = args.spend.limits(false);
     limits.spool.get_or_insert_with(|| fsx::folder_of(output).to_owned());
     let converted = suture_core::convert(input, &draft.path(), format, &limits, &Quiet).map_err(|error| error.to_string())?;
-    place(&draft, input, output, args.force).map_err(failed)?;
+    draft.place_like(input, output, args.force).map_err(failed)?;
     Ok(converted)
-}
-
-fn place(draft: &Draft, input: &Path, output: &Path, force: bool) -> std::io::Result<()> {
-    draft.sync()?;
-    draft.place(output, Rights::of(&std::fs::metadata(input)?), force)?;
-    fsx::sync_dir(fsx::folder_of(output))
 }

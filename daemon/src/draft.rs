@@ -69,6 +69,16 @@ impl Draft {
         }
     }
 
+    /// Makes it durable under its name, as [`Draft::place`], with the rights of the file `like`.
+    ///
+    /// # Errors
+    /// As those of [`Draft::sync`] and [`Draft::place`].
+    pub(crate) fn place_like(&self, like: &Path, target: &Path, replace: bool) -> io::Result<()> {
+        self.sync()?;
+        self.place(target, Rights::of(&std::fs::metadata(like)?), replace)?;
+        fsx::sync_dir(&self.folder)
+    }
+
     /// Gives it its name, which must lie in its folder, with these rights. An existing file is replaced if `replace` says so; otherwise
     /// it is an error of kind `AlreadyExists`. The name is durable once the folder is synced.
     ///

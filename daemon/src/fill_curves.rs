@@ -1,7 +1,7 @@
 //! `suture fill-curves`: surfaces between curves of CAD programs, as a mesh or as surfaces.
 
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use serde_json::{Value, json};
 use suture_core::curves::fill::{self, FilledNetwork, Method, Options};
@@ -15,7 +15,6 @@ use crate::draft::Draft;
 use crate::exit::Exit;
 use crate::fsx;
 use crate::naming;
-use crate::rights::Rights;
 use crate::say::{complain, plain, print};
 
 /// Outlines that are named one by one.
@@ -115,10 +114,7 @@ fn write_mesh(
     limits.spool.get_or_insert_with(|| fsx::folder_of(output).to_owned());
     let of = (args.input.as_path(), &filled.filled, network.unit.millimetres);
     let mesh = suture_core::write_curve_mesh(of, (&draft.path(), format), &limits, &Quiet).map_err(|error| error.to_string())?;
-    draft.sync().map_err(failed)?;
-    let rights = Rights::of(&std::fs::metadata(&args.input).map_err(failed)?);
-    draft.place(output, rights, args.force).map_err(failed)?;
-    fsx::sync_dir(fsx::folder_of(output)).map_err(failed)?;
+    draft.place_like(&args.input, output, args.force).map_err(failed)?;
     Ok(mesh)
 }
 
@@ -223,10 +219,9 @@ fn as_json(args: &FillCurvesArgs, done: &Done) -> Value {
         })
     };
     let outlines = filled.outlines.iter().zip(&filled.filled.reports).enumerate().map(outline);
-    let paths: [PathBuf; 2] = [args.input.clone(), args.output.clone()];
     json!({
-        "input": paths[0].to_string_lossy(),
-        "output": paths[1].to_string_lossy(),
+        "input": args.input.to_string_lossy(),
+        "output": args.output.to_string_lossy(),
         "unit": network.unit.name,
         "millimetres": network.unit.millimetres,
         "outlines": outlines.collect::<Vec<_>>(),

@@ -92,7 +92,7 @@ pub enum ReadError {
     Json {
         /// Where.
         path: String,
-        /// What is wrong.
+        /// The fault, in words.
         problem: String,
     },
 }

@@ -63,6 +63,17 @@ pub fn unit(a: Point) -> Option<Point> {
     (length > 0.0 && length.is_finite()).then(|| scale(a, 1.0 / length))
 }
 
+/// Length of a vector by a plain root: much faster than [`norm`], for lengths whose squares do not overflow.
+pub(crate) fn plain_norm(a: Point) -> f64 {
+    dot(a, a).sqrt()
+}
+
+/// The direction of a vector by [`plain_norm`]; `None` of one that has none.
+pub(crate) fn plain_unit(a: Point) -> Option<Point> {
+    let length = plain_norm(a);
+    (length > 0.0 && length.is_finite()).then(|| scale(a, 1.0 / length))
+}
+
 /// Whether all coordinates are numbers.
 #[must_use]
 pub fn is_finite(a: Point) -> bool {

@@ -12,7 +12,6 @@
 mod apply;
 mod feature;
 mod features;
-mod linear;
 mod loops;
 mod mesh;
 mod reason;

@@ -1,21 +1,10 @@
 //! Points and vectors of space, in mm.
 
-pub(crate) use crate::curves::vector::{Point, add, between, cross, dot, scale, sub};
+pub(crate) use crate::curves::vector::{Point, add, between, cross, dot, plain_norm as norm, plain_unit as unit, scale, sub};
 
-/// Length of a vector: a plain root, as `hypot` takes half of the time of all fits, and lengths of parts never overflow.
-pub(crate) fn norm(a: Point) -> f64 {
-    dot(a, a).sqrt()
-}
-
-/// Distance of two points.
+/// Distance of two points. (Of lengths of parts a plain root is enough; `hypot` takes half of the time of all fits.)
 pub(crate) fn distance(a: Point, b: Point) -> f64 {
     norm(sub(a, b))
-}
-
-/// The direction of a vector; `None` of one that has none.
-pub(crate) fn unit(a: Point) -> Option<Point> {
-    let length = norm(a);
-    (length > 0.0 && length.is_finite()).then(|| scale(a, 1.0 / length))
 }
 
 /// `a + b · factor`.

@@ -5,17 +5,19 @@ use std::path::Path;
 
 use rayon::prelude::*;
 
+use super::copying;
 use super::files::{self, Made};
 use crate::contract::error::{Error, Result};
 use crate::contract::hint::{Hint, HintKind};
 use crate::contract::progress::Progress;
-use crate::contract::report::{AttributesKept, Outcome, Report};
+use crate::contract::report::{AttributesKept, FaceOrigin, Outcome, Report};
 use crate::contract::settings::{KeepAttributes, Limits, Profile};
 use crate::geometry::position;
 use crate::io::read::MeshFile;
-use crate::io::record;
+use crate::io::record::{self, Record};
 use crate::io::rows::Said;
 use crate::io::write_behind::WriteBehind;
+use crate::output::edit::Edit;
 use crate::output::emit;
 use crate::output::model::{Account, Change};
 use crate::output::rows::Planned;
@@ -31,21 +33,25 @@ pub(crate) fn account(said: &Said<'_>, planned: Option<&Planned<'_>>, triangles:
 }
 
 /// The fate of the attribute words of an STL that is an STL again, where one of them is touched or the profile asks. O(edit), and O(n) then.
-pub(crate) fn words_account(made: &Made, profile: &Profile) -> Option<Account> {
-    let records = made.mesh.records();
-    let has_word = |t: u32| records.get(t as usize).is_some_and(|record| record::attribute(record) != 0);
-    let parents: BTreeSet<u32> = made.edit.added_with_origins().filter_map(|(_, from)| from.input_face()).collect();
-    let mut account = Account::default();
-    for (_, from) in made.edit.added_with_origins().filter(|(record, _)| record::attribute(record) != 0) {
-        *(if from.input_face().is_some() { &mut account.divided } else { &mut account.inherited }) += 1;
-    }
-    let gone: Vec<u32> = made.edit.deleted_records().filter(|t| has_word(*t)).collect();
-    account.lost = gone.iter().filter(|t| !parents.contains(t)).count() as u64;
-    if account == Account::default() && profile.attributes == KeepAttributes::Best {
+pub(crate) fn words_account(mesh: &MeshFile, edit: &Edit, profile: &Profile) -> Option<Account> {
+    let records = mesh.records();
+    let has_word = |record: &Record| record::attribute(record) != 0;
+    let gone: Vec<u32> = edit.deleted_records().filter(|t| records.get(*t as usize).is_some_and(has_word)).collect();
+    let new: Vec<FaceOrigin> = edit.added_with_origins().filter(|(record, _)| has_word(record)).map(|(_, from)| from).collect();
+    // Nearly all files have no word but 0.
+    if gone.is_empty() && new.is_empty() && profile.attributes == KeepAttributes::Best {
         return None;
     }
-    let words = records.par_iter().filter(|record| record::attribute(record) != 0).count() as u64;
-    account.kept = words - gone.len() as u64;
+    let parents: BTreeSet<u32> = edit.added_with_origins().filter_map(|(_, from)| from.input_face()).collect();
+    let divided = new.iter().filter(|from| from.input_face().is_some()).count() as u64;
+    let words = records.par_iter().filter(|record| has_word(record)).count() as u64;
+    let account = Account {
+        kept: words - gone.len() as u64,
+        divided,
+        approximated: 0,
+        inherited: new.len() as u64 - divided,
+        lost: gone.iter().filter(|t| !parents.contains(t)).count() as u64,
+    };
     (account != Account::default()).then_some(account)
 }
 
@@ -141,8 +147,7 @@ pub(crate) fn confirm(planned: &Planned<'_>, result: &MeshFile, written: &MeshFi
     if holds && rest.is_empty() && written.records().len() == result.records().len() {
         return Ok(());
     }
-    let source = std::io::Error::other("the file does not hold what was written to it");
-    Err(Error::io(written.path(), "reading back")(source))
+    Err(copying::differs(written.path()))
 }
 
 impl Account {

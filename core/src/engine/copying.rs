@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::contract::error::Result;
+use crate::contract::error::{Error, Result};
 use crate::contract::progress::Progress;
 use crate::contract::settings::Limits;
 use crate::engine::files;
@@ -16,4 +16,9 @@ pub(crate) fn copy(input: &Path, output: &Path, limits: &Limits, progress: &dyn 
     written.durable()?;
     mesh.check_unchanged()?;
     files::open(output, limits, progress)
+}
+
+/// The error of a written file that, read back, is another one.
+pub(crate) fn differs(path: &Path) -> Error {
+    Error::io(path, "reading back")(std::io::Error::other("the file does not hold what was written to it"))
 }

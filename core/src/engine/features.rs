@@ -1,15 +1,14 @@
 //! Features that a profile does not want: looked for in a mesh that is good, and told of in its report.
 
-use std::collections::HashMap;
 use std::path::Path;
 
 use crate::contract::error::{Error, Result};
-use crate::contract::report::{Certificate, Feature, Features, MOST_LISTED, Outcome, RepairName, Report};
+use crate::contract::report::{Feature, Features, MOST_LISTED, Outcome, RepairName, Report};
 use crate::contract::settings::Profile;
 use crate::defeature::{self, Limits as Below, Removed};
 use crate::engine::judging;
+use crate::engine::mesh::Mesh;
 use crate::engine::work::Work;
-use crate::geometry::position;
 use crate::io::record::{self, Record};
 use crate::output::edit::Edit;
 use crate::util::parallel;
@@ -45,25 +44,17 @@ pub(crate) fn find(
         return Ok(Err(format!("features of so many triangles take {needed} MiB of memory, and {given} MiB may be used")));
     }
     work.progress.at("features", 0, records.len() as u64);
-    let (points, triangles) = indexed(records);
-    let removed = parallel::in_pool(work.limits.threads, || defeature::defeature(&points, &triangles, below));
+    let corners: Vec<_> = records.iter().map(record::corners).collect();
+    let mesh = match Mesh::from_triangles(&corners) {
+        Ok(mesh) => mesh,
+        Err(error) => return Ok(Err(error.to_string())),
+    };
+    drop(corners);
+    let removed = parallel::in_pool(work.limits.threads, || defeature::defeature(mesh.vertices(), mesh.faces(), below));
     if work.progress.cancelled() {
         return Err(Error::cancelled(path, "features"));
     }
     Ok(removed.map_err(|error| error.to_string()))
-}
-
-/// Positions, each once in the order of the records, and the triangles by their numbers. −0 is 0.
-fn indexed(records: &[Record]) -> (Vec<[f32; 3]>, Vec<[u32; 3]>) {
-    let (mut numbers, mut points) = (HashMap::new(), Vec::new());
-    let mut number = |point: [f32; 3]| {
-        *numbers.entry(position::bits(point)).or_insert_with(|| {
-            points.push(point);
-            points.len() as u32 - 1
-        })
-    };
-    let triangles = records.iter().map(|record| record::corners(record).map(&mut number)).collect();
-    (points, triangles)
 }
 
 /// New triangles of the mesh without its features.
@@ -82,8 +73,7 @@ pub(crate) fn tell(report: &mut Report, features: &Features, judged: Report, edi
         report.edit = edit.summary(records);
         report.edit_records = report.limits.list_edit.then(|| edit.listed());
     }
-    let faithful = report.certificate.take().and_then(|certificate| certificate.faithful);
-    report.certificate = judged.certificate.map(|certificate| Certificate { faithful, ..certificate });
+    judging::certify_anew(report, judged.certificate);
     (report.after, report.thin_walls) = (Some(judged.before), judged.thin_walls);
 }
 

@@ -105,13 +105,13 @@ pub(crate) fn into_stl(mesh: MeshFile, output: &Path, target: Target, work: Work
     let spool = nameless.as_ref().map(Nameless::path);
     let doubt = mesh.doubt();
     let made = making::make(mesh, spool.as_deref().unwrap_or(output), target.is_input, work, clock)?;
-    let mut report = made.report.clone();
+    let Made { mut report, mesh, edit } = made;
     carried::ask_if_doubtful(&mut report, doubt);
     if report.output.is_none() {
         return Ok(report);
     }
     let account = match says {
-        None => carried::words_account(&made, profile),
+        None => carried::words_account(&mesh, &edit, profile),
         Some(lost) => (lost > 0).then(|| Account { lost, ..Account::default() }),
     };
     report.attributes = account.map(Account::told);
@@ -343,7 +343,7 @@ pub(crate) fn encode(
     // Of one mesh, its name alone may make it a part.
     let ranges = |parts: &[Part]| parts.iter().skip(1).map(|part| part.triangles.clone()).collect::<Vec<_>>();
     if matches!(layout, Layout::Amf(_)) && ranges(written.parts()) != ranges(parts) {
-        return Err(differs(&written));
+        return Err(copying::differs(written.path()));
     }
     Ok(written)
 }
@@ -361,12 +361,7 @@ fn confirm(made: &MeshFile, written: &MeshFile, limits: &Limits) -> Result<()> {
     let holds = parallel::in_pool(limits.threads, || {
         made.len() == records.len() && made.chunks(COMPARED).zip(records.chunks(COMPARED)).all(is_same)
     });
-    if holds && written.is_flawless() { Ok(()) } else { Err(differs(written)) }
-}
-
-fn differs(written: &MeshFile) -> Error {
-    let source = std::io::Error::other("the file does not hold what was written to it");
-    Error::io(written.path(), "reading back")(source)
+    if holds && written.is_flawless() { Ok(()) } else { Err(copying::differs(written.path())) }
 }
 
 #[cfg(test)]

@@ -254,6 +254,12 @@ pub(crate) fn certify(facts: &FileFacts, defects: &Defects, flaws: &[String]) ->
     certificate::certify(facts, &Subject { defects, flaws })
 }
 
+/// Puts the certificate of what was written in the end into the report of a repair, which keeps what it measured of fidelity.
+pub(crate) fn certify_anew(report: &mut Report, certificate: Option<Certificate>) {
+    let faithful = report.certificate.take().and_then(|certificate| certificate.faithful);
+    report.certificate = certificate.map(|certificate| Certificate { faithful, ..certificate });
+}
+
 /// Takes back the hints on units of a mesh whose file says its unit.
 pub(crate) fn know_the_unit(report: &mut Report) {
     report.hints.retain(|hint| !matches!(hint.kind, HintKind::Inches | HintKind::Metres));

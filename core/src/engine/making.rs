@@ -5,7 +5,7 @@
 
 use std::path::Path;
 
-use crate::contract::error::{Error, Result};
+use crate::contract::error::Result;
 use crate::contract::report::{Features, RepairName};
 use crate::defeature::Removed;
 use crate::engine::clock::Clock;
@@ -21,7 +21,7 @@ use crate::output::emit::{self, Content};
 /// Makes `mesh` the new STL `output`, or a copy of its file where that is good, of the output's format and without features that are to go.
 ///
 /// # Errors
-/// [`Error`], any of them.
+/// [`crate::Error`], any of them.
 pub(crate) fn make(mesh: MeshFile, output: &Path, is_of_target: bool, work: Work<'_>, clock: &mut Clock) -> Result<Made> {
     let Work { profile, limits, progress } = work;
     let plain =
@@ -46,7 +46,7 @@ pub(crate) fn make(mesh: MeshFile, output: &Path, is_of_target: bool, work: Work
     clock.stage("emit");
     let facts = files::facts(&written, files::hash(&written, limits, progress));
     if made.report.certificate.as_ref().is_some_and(|certificate| certificate.blake3 != facts.blake3) {
-        return Err(Error::io(output, "reading back")(std::io::Error::other("the file does not hold what was written to it")));
+        return Err(copying::differs(output));
     }
     made.report.output = Some(facts);
     Ok(made)

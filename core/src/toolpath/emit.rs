@@ -4,7 +4,7 @@ use super::model::{Kind, Move, widen};
 use super::options::Units;
 use super::program::{Dialect, Header, ReadError, Travel};
 use super::tool::Tool;
-use super::vector::{Point, is_finite, minus};
+use super::vector::{Point, is_finite, sub};
 use crate::curves::Findings;
 use std::collections::BTreeSet;
 use std::ops::ControlFlow;
@@ -77,10 +77,10 @@ impl<'a> Emitter<'a> {
 
     fn give(&mut self, mut one: Move, origin: Point) -> Result<(), ReadError> {
         if origin != [0.0; 3] {
-            one.from = minus(one.from, origin);
-            one.to = minus(one.to, origin);
+            one.from = sub(one.from, origin);
+            one.to = sub(one.to, origin);
             if let Kind::Arc { centre, .. } = &mut one.kind {
-                *centre = minus(*centre, origin);
+                *centre = sub(*centre, origin);
             }
         }
         self.measure(&one);

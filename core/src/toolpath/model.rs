@@ -1,6 +1,6 @@
 //! Moves of a tool.
 
-use super::vector::{Point, cross, dot, length, minus, plus, times};
+use super::vector::{Point, add, cross, dot, length, scale, sub};
 
 /// A plane of arcs, canned cycles and cutter compensation; its normal is the third axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
@@ -90,7 +90,7 @@ impl Move {
     #[must_use]
     pub fn point(&self, at: f64) -> [f64; 3] {
         let Kind::Arc { centre, normal, sweep } = self.kind else {
-            return plus(times(self.from, 1.0 - at), times(self.to, at));
+            return add(scale(self.from, 1.0 - at), scale(self.to, at));
         };
         if at >= 1.0 {
             return self.to;
@@ -99,18 +99,18 @@ impl Move {
         let (end, end_rise) = spoke_of(self.to, centre, normal);
         let radius = length(spoke);
         if radius == 0.0 {
-            return plus(times(self.from, 1.0 - at), times(self.to, at));
+            return add(scale(self.from, 1.0 - at), scale(self.to, at));
         }
         let (sin, cos) = (sweep * at).sin_cos();
-        let turned = plus(times(spoke, cos), times(cross(normal, spoke), sin));
+        let turned = add(scale(spoke, cos), scale(cross(normal, spoke), sin));
         let grown = 1.0 + (end / radius - 1.0) * at;
-        plus(plus(centre, times(turned, grown)), times(normal, rise + (end_rise - rise) * at))
+        add(add(centre, scale(turned, grown)), scale(normal, rise + (end_rise - rise) * at))
     }
 
     /// Its length in millimetres; that of a helix, of the mean of its radii. O(1).
     #[must_use]
     pub fn length(&self) -> f64 {
-        let Kind::Arc { centre, normal, sweep } = self.kind else { return length(minus(self.to, self.from)) };
+        let Kind::Arc { centre, normal, sweep } = self.kind else { return length(sub(self.to, self.from)) };
         let [(start, low), (end, high)] = [self.from, self.to].map(|point| spoke_of(point, centre, normal));
         (0.5 * (start + end) * sweep).hypot(high - low)
     }
@@ -142,9 +142,9 @@ impl Move {
 
 /// The way from the axis to a point, and how far along the axis it is.
 fn spoke(point: Point, centre: Point, normal: Point) -> (Point, f64) {
-    let from_centre = minus(point, centre);
+    let from_centre = sub(point, centre);
     let rise = dot(from_centre, normal);
-    (minus(from_centre, times(normal, rise)), rise)
+    (sub(from_centre, scale(normal, rise)), rise)
 }
 
 /// Distance from the axis, and how far along it.
@@ -192,7 +192,7 @@ mod tests {
             let mut chords = 0.0;
             for step in 0..200 {
                 let [here, next] = [step, step + 1].map(|step| one.point(f64::from(step) / 200.0));
-                chords += length(minus(next, here));
+                chords += length(sub(next, here));
                 for axis in 0..3 {
                     proptest::prop_assert!(here[axis] >= low[axis] - 1e-9 && here[axis] <= high[axis] + 1e-9);
                 }

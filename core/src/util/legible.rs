@@ -27,7 +27,12 @@ pub(crate) fn escaped(words: &str, most: usize) -> String {
     text
 }
 
-/// The same of bytes, which may be no UTF-8.
+/// All of a file's own words in one line, to be written into another file: blanks in place of control characters.
+pub(crate) fn in_one_line(words: &str) -> String {
+    words.chars().map(|character| if character.is_control() { ' ' } else { character }).collect()
+}
+
+/// As [`legible`], of bytes, which may be no UTF-8.
 pub(crate) fn legible_bytes(words: &[u8]) -> String {
     let start = words.get(..4 * SHOWN + 4).unwrap_or(words);
     legible(&String::from_utf8_lossy(start))

@@ -12,6 +12,7 @@ pub(crate) mod cost;
 pub(crate) mod ids;
 pub(crate) mod lean;
 pub(crate) mod legible;
+pub(crate) mod linear;
 pub(crate) mod machine;
 pub(crate) mod parallel;
 pub(crate) mod parity;

@@ -18,7 +18,7 @@ pub enum BodyError {
     Edge {
         /// Which.
         edge: usize,
-        /// What is wrong.
+        /// The fault, in words.
         problem: &'static str,
     },
     /// A surface whose degrees, knots, points and weights do not go together.
@@ -26,7 +26,7 @@ pub enum BodyError {
     Surface {
         /// Which.
         face: usize,
-        /// What is wrong.
+        /// The fault, in words.
         problem: &'static str,
     },
     /// A loop that is not closed, or has an edge that is not there.
@@ -36,7 +36,7 @@ pub enum BodyError {
         face: usize,
         /// 0 for the outer loop, then the inner ones.
         ring: usize,
-        /// What is wrong.
+        /// The fault, in words.
         problem: &'static str,
     },
 }

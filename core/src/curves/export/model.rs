@@ -1,4 +1,4 @@
-//! What is written: surfaces, and what trims them.
+//! The model that is written: surfaces, and the loops that trim them.
 
 use std::borrow::Cow;
 
@@ -43,7 +43,7 @@ pub struct EdgeUse {
 /// A surface and the loops that trim it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Face {
-    /// What is trimmed.
+    /// The surface that is trimmed.
     pub surface: Surface,
     /// Edges around it in their order, anticlockwise as seen from outside of the body; sides of the surface that shrink to a
     /// point have none. Empty of a face that is all of its surface.
@@ -75,7 +75,7 @@ pub(super) type Rings<'a> = Vec<Cow<'a, [EdgeUse]>>;
 /// Words of a file's header; nothing else than given is written, above all no time of day.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Header<'a> {
-    /// What the part is called.
+    /// The name of the part.
     pub name: &'a str,
     /// When it was made, as ISO 8601 has it: `2026-11-28T07:15:00`. Without one, the field is empty.
     pub time: Option<&'a str>,

@@ -14,7 +14,7 @@ use crate::curves::{Network, Use};
 const SAMPLES: u32 = 8;
 const NEAR: f64 = 1e-5;
 
-/// What is filled of a network.
+/// The outlines of a network, filled.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct FilledNetwork {

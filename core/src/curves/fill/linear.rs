@@ -1,30 +1,6 @@
-//! Small systems of linear equations, and those of a narrow band.
+//! Dense systems of linear equations of any size, and those of a narrow band.
 
 use crate::curves::vector::{Point, add, scale, sub};
-
-/// Solves a small dense system by elimination with the largest pivot of each column; `None` if it is singular. O(N³).
-pub(super) fn solve<const N: usize>(mut matrix: [[f64; N]; N], mut right: [f64; N]) -> Option<[f64; N]> {
-    let size = matrix.iter().flatten().fold(0.0_f64, |most, x| most.max(x.abs()));
-    for column in 0..N {
-        let pivot = (column..N).max_by(|a, b| matrix[*a][column].abs().total_cmp(&matrix[*b][column].abs()))?;
-        matrix.swap(column, pivot);
-        right.swap(column, pivot);
-        let top = matrix[column];
-        if top[column].abs() <= 1e-13 * size || !size.is_finite() {
-            return None;
-        }
-        for row in column + 1..N {
-            let factor = matrix[row][column] / top[column];
-            matrix[row].iter_mut().zip(top).for_each(|(x, y)| *x -= factor * y);
-            right[row] -= factor * right[column];
-        }
-    }
-    for row in (0..N).rev() {
-        let known: f64 = (row + 1..N).map(|column| matrix[row][column] * right[column]).sum();
-        right[row] = (right[row] - known) / matrix[row][row];
-    }
-    right.iter().all(|x| x.is_finite()).then_some(right)
-}
 
 /// Solves a dense system, whose rows have their right side behind them, by elimination with the largest pivot of each column; `None` if it
 /// is singular. O(rows³).
@@ -134,12 +110,6 @@ pub(super) fn eigen(mut matrix: [[f64; 3]; 3]) -> [(f64, Point); 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn a_system_is_solved_and_a_singular_one_refused() {
-        assert_eq!(solve([[0.0, 2.0], [4.0, 0.0]], [2.0, 8.0]), Some([2.0, 1.0]));
-        assert_eq!(solve([[1.0, 2.0], [2.0, 4.0]], [1.0, 2.0]), None);
-    }
 
     /// Three observations of single functions, and one of two neighbours that agrees with them.
     #[test]

@@ -1,8 +1,9 @@
 //! Frames, planes and circles through points.
 
-use super::linear::{eigen, solve};
+use super::linear::eigen;
 use crate::curves::curve::widen;
 use crate::curves::vector::{Point, add, cross, distance, dot, norm, scale, sub, unit};
+use crate::util::linear::solve;
 
 /// An origin and three axes, each of length 1 and perpendicular to the others, right-handed.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -248,10 +248,7 @@ fn neighbours_share_points_and_threads_change_nothing() {
     ];
     let shapes: Vec<Shape> = ends.iter().enumerate().map(|(number, (a, b))| bend(*a, *b, 0.2 + 0.1 * number as f64)).collect();
     let outlines = [outline([1, 2, 3, 4]), outline([5, 6, 7, -2])];
-    let run = |threads: usize| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| filled(&shapes, &outlines, &Options::default()))
-    };
+    let run = |threads: usize| crate::util::parallel::in_pool(threads, || filled(&shapes, &outlines, &Options::default()));
     let result = run(1);
     assert!(result.reports.iter().all(|report| report.method == Method::Coons && report.error <= 1e-6 && report.chord < 0.01));
     assert!(edges(&result.mesh).values().all(|edge| edge.1 == 1 || *edge == (0, 2)));

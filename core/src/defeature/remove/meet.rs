@@ -1,8 +1,8 @@
 //! Where surfaces meet: points and curves.
 
-use super::super::linear::solve;
 use super::super::surface::Surface;
 use super::super::vector::{Point, add, between, distance, dot};
+use crate::util::linear::solve;
 
 /// Steps to a common point.
 const STEPS: usize = 30;

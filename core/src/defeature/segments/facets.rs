@@ -1,8 +1,8 @@
 //! Maximal flat pieces of a mesh.
 
-use super::super::linear::eigen;
 use super::super::mesh::Mesh;
 use super::super::vector::{Point, dot, mean, norm, scale, sub, unit};
+use crate::util::linear::eigen;
 
 /// Normals of triangles of one facet differ by 1.5° at most, those of slivers excepted.
 const COS_FLAT: f64 = 0.999_657;

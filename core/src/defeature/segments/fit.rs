@@ -1,8 +1,8 @@
 //! Surfaces fitted to vertices: Gauss–Newton steps from a start.
 
-use super::super::linear::solve;
 use super::super::surface::Surface;
 use super::super::vector::Point;
+use crate::util::linear::solve;
 
 /// Points that a fit looks at, taken evenly from those there are.
 const MOST_POINTS: usize = 200;

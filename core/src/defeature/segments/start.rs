@@ -1,8 +1,8 @@
 //! Algebraic starts: surfaces through a few facets and their normals.
 
-use super::super::linear::{eigen, solve};
 use super::super::surface::{Surface, meridian};
 use super::super::vector::{Point, along, cross, dot, frame, mean, norm, scale, sub, unit};
+use crate::util::linear::{eigen, solve};
 
 /// A facet's middle and normal.
 pub(super) type Ray = (Point, Point);

@@ -15,13 +15,14 @@ mod units;
 use std::path::Path;
 
 use crate::contract::error::{Error, Result};
-use crate::contract::report::{Certificate, FileFacts, Format, Outcome, Report, Task};
+use crate::contract::report::{FileFacts, Format, Outcome, Report, Task};
 use crate::contract::settings::{OutputFormat, Profile, folder_of};
 use crate::engine::carried;
 use crate::engine::clock::Clock;
 use crate::engine::copying;
 use crate::engine::files;
 use crate::engine::formats;
+use crate::engine::judging;
 use crate::engine::together::{certify, together};
 use crate::engine::work::Work;
 use crate::io::disk_space::{self, Need};
@@ -97,8 +98,7 @@ fn judge_built(report: &mut Report, output: &Path, work: Work<'_>, clock: &mut C
     let built = files::open(output, work.limits, work.progress)?;
     let judged = files::look(&built, (work.profile, work.limits), work.progress, clock)?;
     report.after = Some(judged.before);
-    let faithful = report.certificate.take().and_then(|certificate| certificate.faithful);
-    report.certificate = judged.certificate.map(|certificate| Certificate { faithful, ..certificate });
+    judging::certify_anew(report, judged.certificate);
     if judged.verdict.good {
         if report.outcome == Outcome::Clean {
             // Good as it came, and yet other bytes.

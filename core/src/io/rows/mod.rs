@@ -22,7 +22,7 @@ use obj::Obj;
 use off::Off;
 use ply::Ply;
 pub(crate) use table::{CHANNELS, Corner, FaceRow, Faces, NONE, Rows, Source, State, TEXTURE, Triangle, VERTICES, WHOLE};
-pub(crate) use values::{Mix, mixed, set_position};
+pub(crate) use values::{Mix, facing, mixed, set_position};
 
 /// What a file says besides the positions and faces of its mesh.
 pub(crate) enum Said<'a> {

@@ -6,7 +6,7 @@ use std::sync::OnceLock;
 
 use super::cells::{self, Cells, Form};
 use super::table::{Corner, FaceRow, Faces, NONE, Rows, Source, Triangle, VERTICES};
-use super::values::Mix;
+use super::values::{Mix, facing};
 use crate::io::read::Vertices;
 use crate::io::read::elements::cursor::Cursor;
 use crate::io::read::elements::layout::{Layout, Scalar, Step};
@@ -340,10 +340,7 @@ impl Ply<'_> {
             cells.get(place)?.first().copied()
         };
         let [Some(nx), Some(ny), Some(nz)] = [b"nx", b"ny", b"nz"].map(|name| value(name)) else { return true };
-        let [a, b, c] = triangle.corners.map(|corner| self.position(corner[VERTICES]).unwrap_or_default());
-        let from_a = |p: Point| [0, 1, 2].map(|k| f64::from(p[k]) - f64::from(a[k]));
-        let ([x, y, z], [u, v, w]) = (from_a(b), from_a(c));
-        let now = [y * w - z * v, z * u - x * w, x * v - y * u];
+        let now = facing(triangle.corners.map(|corner| self.position(corner[VERTICES]).unwrap_or_default()));
         nx * now[0] + ny * now[1] + nz * now[2] <= 0.0
     }
 

@@ -2,6 +2,13 @@
 
 use crate::io::record::Point;
 
+/// A vector that looks where a triangle looks, of twice its area.
+pub(crate) fn facing([a, b, c]: [Point; 3]) -> [f64; 3] {
+    let from_a = |p: Point| [0, 1, 2].map(|k| f64::from(p[k]) - f64::from(a[k]));
+    let ([x, y, z], [u, v, w]) = (from_a(b), from_a(c));
+    [y * w - z * v, z * u - x * w, x * v - y * u]
+}
+
 /// How a number of a new row follows from the same number of other rows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Mix {

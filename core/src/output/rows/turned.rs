@@ -2,8 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use crate::io::record::Point;
-use crate::io::rows::{CHANNELS, Corner, Mix, NONE, Rows, VERTICES};
+use crate::io::rows::{CHANNELS, Corner, Mix, NONE, Rows, VERTICES, facing};
 
 /// The file says normals at corners.
 pub(super) fn has_normals(rows: &dyn Rows) -> bool {
@@ -20,7 +19,7 @@ pub(super) fn against(rows: &dyn Rows, turned: &[[Corner; 3]]) -> Option<u64> {
         let values = rows.values(channel, &named)?;
         for (is_against, corners) in is_against.iter_mut().zip(turned) {
             let [a, b, c] = corners.map(|corner| rows.position(corner[VERTICES]));
-            let now = normal([a?, c?, b?]);
+            let now = facing([a?, c?, b?]);
             *is_against |= corners.iter().filter_map(|corner| values.get(&corner[channel])?.get(first..first + 3)).any(|own| {
                 // Of no direction at all, nothing can be said.
                 own.iter().zip(now).map(|(x, y)| x * y).sum::<f64>() < 0.0
@@ -28,10 +27,4 @@ pub(super) fn against(rows: &dyn Rows, turned: &[[Corner; 3]]) -> Option<u64> {
         }
     }
     Some(is_against.into_iter().filter(|is| *is).count() as u64)
-}
-
-fn normal([a, b, c]: [Point; 3]) -> [f64; 3] {
-    let from_a = |p: Point| [0, 1, 2].map(|k| f64::from(p[k]) - f64::from(a[k]));
-    let ([x, y, z], [u, v, w]) = (from_a(b), from_a(c));
-    [y * w - z * v, z * u - x * w, x * v - y * u]
 }

@@ -5,7 +5,7 @@ use super::reader::Reader;
 use super::statement::Statement;
 use crate::toolpath::model::Kind;
 use crate::toolpath::program::ReadError;
-use crate::toolpath::vector::{Point, plus, times};
+use crate::toolpath::vector::{Point, add, scale};
 
 impl Reader<'_> {
     /// `CYCLE/DRILL, DEPTH, d, CLEAR, c` of Creo, `CYCLE/DRILL, FEDTO, d, RAPTO, c` of NCL and NX; `CYCLE/OFF`.
@@ -39,7 +39,7 @@ impl Reader<'_> {
     pub(super) fn drill(&mut self, point: Point) -> Result<(), ReadError> {
         let Some(cycle) = self.cycle else { return Ok(()) };
         self.is_rapid = false;
-        let at = |height: f64, axis: Point| plus(point, times(axis, height));
+        let at = |height: f64, axis: Point| add(point, scale(axis, height));
         let axis = self.axis;
         self.go(at(cycle.back, axis), true)?;
         if cycle.back != cycle.clear {

@@ -4,7 +4,7 @@ use super::reader::{Reader, three};
 use super::statement::{Statement, number};
 use crate::toolpath::model::{Kind, Move};
 use crate::toolpath::program::ReadError;
-use crate::toolpath::vector::{Point, cross, dot, length, minus, plus, times, unit};
+use crate::toolpath::vector::{Point, add, cross, dot, length, scale, sub, unit};
 use std::f64::consts::TAU;
 
 impl Reader<'_> {
@@ -22,7 +22,7 @@ impl Reader<'_> {
         if let Some(axis) = numbers.get(3..6) {
             self.set_axis(axis);
         }
-        times(three(numbers).unwrap_or_default(), self.unit)
+        scale(three(numbers).unwrap_or_default(), self.unit)
     }
 
     /// `GOTO`.
@@ -42,12 +42,12 @@ impl Reader<'_> {
     pub(super) fn godlta(&mut self, statement: &Statement) -> Result<(), ReadError> {
         let numbers = statement.numbers();
         let way = match (three(&numbers), numbers.as_slice()) {
-            (Some(way), _) => times(way, self.unit),
-            (None, [along]) => times(self.axis, along * self.unit),
+            (Some(way), _) => scale(way, self.unit),
+            (None, [along]) => scale(self.axis, along * self.unit),
             _ => return self.refuse(format!("GODLTA without one or three numbers (“{}”)", statement.rest)),
         };
         let is_rapid = std::mem::take(&mut self.is_rapid);
-        self.go(plus(self.position, way), is_rapid)
+        self.go(add(self.position, way), is_rapid)
     }
 
     /// `FROM`: where the tool is.
@@ -98,7 +98,7 @@ impl Reader<'_> {
             return self.refuse(format!("{} without a centre and an axis (“{}”)", statement.word, statement.rest));
         };
         let Some(axis) = unit(axis) else { return self.refuse("an arc whose axis has no direction") };
-        let centre = times(centre, self.unit);
+        let centre = scale(centre, self.unit);
         if let Some(degrees) = statement.behind(&["ANGLE", "DEGREE"]) {
             return self.turn(centre, axis, degrees.to_radians());
         }
@@ -108,10 +108,10 @@ impl Reader<'_> {
 
     /// An arc by its angle.
     fn turn(&mut self, centre: Point, normal: Point, sweep: f64) -> Result<(), ReadError> {
-        let spoke = minus(self.position, centre);
-        let along = times(normal, dot(spoke, normal));
-        let flat = minus(spoke, along);
-        let to = plus(plus(centre, along), plus(times(flat, sweep.cos()), times(cross(normal, flat), sweep.sin())));
+        let spoke = sub(self.position, centre);
+        let along = scale(normal, dot(spoke, normal));
+        let flat = sub(spoke, along);
+        let to = add(add(centre, along), add(scale(flat, sweep.cos()), scale(cross(normal, flat), sweep.sin())));
         self.push(to, Kind::Arc { centre, normal, sweep })
     }
 
@@ -119,8 +119,8 @@ impl Reader<'_> {
     fn arc(&mut self, to: Point, centre: Point, normal: Point) -> Result<(), ReadError> {
         self.is_rapid = false;
         let flat = |point: Point| {
-            let spoke = minus(point, centre);
-            minus(spoke, times(normal, dot(spoke, normal)))
+            let spoke = sub(point, centre);
+            sub(spoke, scale(normal, dot(spoke, normal)))
         };
         let [start, end] = [flat(self.position), flat(to)];
         let [inner, outer] = [length(start), length(end)];
@@ -145,12 +145,12 @@ impl Reader<'_> {
         let Some(direction) = self.direction.take().filter(|_| is_arc) else {
             return self.refuse(format!("{} along a circle without INDIRV before it", statement.word));
         };
-        let (centre, to) = (times(centre, self.unit), times(to, self.unit));
-        let spoke = minus(self.position, centre);
+        let (centre, to) = (scale(centre, self.unit), scale(to, self.unit));
+        let spoke = sub(self.position, centre);
         // About the tool's axis, or about the one that the way and the spoke span.
         let normal = unit(cross(spoke, direction)).unwrap_or(self.axis);
         let normal =
-            if dot(normal, self.axis).abs() > 0.999 { times(self.axis, dot(normal, self.axis).signum()) } else { normal };
+            if dot(normal, self.axis).abs() > 0.999 { scale(self.axis, dot(normal, self.axis).signum()) } else { normal };
         self.arc(to, centre, normal)
     }
 }

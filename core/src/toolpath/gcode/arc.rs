@@ -4,7 +4,7 @@ use super::block::Block;
 use super::fault::{Fault, refused};
 use super::interpreter::Interpreter;
 use crate::toolpath::model::Kind;
-use crate::toolpath::vector::{Point, minus};
+use crate::toolpath::vector::{Point, sub};
 use std::f64::consts::TAU;
 
 /// Angles below it, in radians, are a full circle: what is left of rounding.
@@ -42,7 +42,7 @@ impl Interpreter<'_> {
     /// The angle from here to a point.
     fn sweep(&self, to: Point, centre: Point, is_clockwise: bool) -> f64 {
         let [a, b, _] = self.machine.modes.plane.axes();
-        let [start, end] = [minus(self.machine.position, centre), minus(to, centre)];
+        let [start, end] = [sub(self.machine.position, centre), sub(to, centre)];
         let angle = (start[a] * end[b] - start[b] * end[a]).atan2(start[a] * end[a] + start[b] * end[b]);
         if angle.abs() < NO_ANGLE {
             return if is_clockwise { -TAU } else { TAU };

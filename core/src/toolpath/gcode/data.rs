@@ -4,7 +4,7 @@ use super::block::{Block, bit};
 use super::fault::{Fault, refused};
 use super::interpreter::Interpreter;
 use crate::toolpath::model::Kind;
-use crate::toolpath::vector::{Point, minus};
+use crate::toolpath::vector::{Point, sub};
 
 impl Interpreter<'_> {
     /// `G10`: offsets of work (L2, L20) and of tools (L1, L10 to L13).
@@ -109,7 +109,7 @@ impl Interpreter<'_> {
                         self.machine.known[axis] = true;
                     }
                 }
-                let change = minus(self.machine.position, told);
+                let change = sub(self.machine.position, told);
                 (0..3).for_each(|axis| self.machine.offset_92[axis] += change[axis]);
             }
             921 => {

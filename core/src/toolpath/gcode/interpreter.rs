@@ -16,7 +16,7 @@ use crate::toolpath::emit::{Emitter, Receiver};
 use crate::toolpath::lines::Place;
 use crate::toolpath::options::{Options, Units};
 use crate::toolpath::program::{Header, ReadError};
-use crate::toolpath::vector::times;
+use crate::toolpath::vector::scale;
 use crate::util::legible::legible_bytes;
 
 /// Lines that are not read, at most; a file with more is not what it seems.
@@ -214,16 +214,16 @@ impl<'a> Interpreter<'a> {
     /// Tells the parameters where the machine is.
     fn publish(&mut self) {
         let (machine, modes) = (&self.machine, &self.machine.modes);
-        let scale = 1.0 / modes.unit;
+        let units = 1.0 / modes.unit;
         self.parameters.system = System {
-            position: times(machine.position, scale),
-            offset_92: times(machine.offset_92, scale),
-            offsets: std::array::from_fn(|system| times(machine.offsets[system], scale)),
+            position: scale(machine.position, units),
+            offset_92: scale(machine.offset_92, units),
+            offsets: std::array::from_fn(|system| scale(machine.offsets[system], units)),
             system: modes.system,
             tool: self.tools.current,
             selected: self.tools.selected,
-            diameter: self.tools.diameter(self.tools.current).unwrap_or(0.0) * scale,
-            feed: modes.feed * scale,
+            diameter: self.tools.diameter(self.tools.current).unwrap_or(0.0) * units,
+            feed: modes.feed * units,
             speed: machine.speed,
             plane: [170.0, 180.0, 190.0][modes.plane as usize],
             is_metric: modes.unit == 1.0,

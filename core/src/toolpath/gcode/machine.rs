@@ -3,7 +3,7 @@
 use super::fault::{Fault, refused};
 use crate::toolpath::model::Plane;
 use crate::toolpath::options::Rotary;
-use crate::toolpath::vector::{Point, minus, plus};
+use crate::toolpath::vector::{Point, add, sub};
 
 /// Work coordinate systems: nine, and 300 of `G54.1`.
 const SYSTEMS: usize = 309;
@@ -140,7 +140,7 @@ impl Machine {
 
     fn shift(&self) -> Point {
         let offset_92 = if self.is_92_on { self.offset_92 } else { [0.0; 3] };
-        plus(offset_92, self.offset_52)
+        add(offset_92, self.offset_52)
     }
 
     fn turn(&self, backwards: bool) -> Option<(f64, f64)> {
@@ -157,24 +157,24 @@ impl Machine {
             point = std::array::from_fn(|axis| centre[axis] + (point[axis] - centre[axis]) * by[axis]);
         }
         if let Some(Rotation { centre, sin, cos }) = self.rotation {
-            point = plus(centre, rotate(minus(point, centre), sin, cos));
+            point = add(centre, rotate(sub(point, centre), sin, cos));
         }
-        point = plus(point, self.shift());
+        point = add(point, self.shift());
         if let Some((sin, cos)) = self.turn(false) {
             point = rotate(point, sin, cos);
         }
-        plus(point, self.offsets[self.modes.system])
+        add(point, self.offsets[self.modes.system])
     }
 
     /// How the program would write a place.
     pub(super) fn backward(&self, mut place: Point) -> Point {
-        place = minus(place, self.offsets[self.modes.system]);
+        place = sub(place, self.offsets[self.modes.system]);
         if let Some((sin, cos)) = self.turn(true) {
             place = rotate(place, sin, cos);
         }
-        place = minus(place, self.shift());
+        place = sub(place, self.shift());
         if let Some(Rotation { centre, sin, cos }) = self.rotation {
-            place = plus(centre, rotate(minus(place, centre), -sin, cos));
+            place = add(centre, rotate(sub(place, centre), -sin, cos));
         }
         if let Some(Scaling { centre, by }) = self.scaling {
             place = std::array::from_fn(|axis| centre[axis] + (place[axis] - centre[axis]) / by[axis]);
@@ -184,7 +184,7 @@ impl Machine {
 
     /// Where the program's zero is.
     pub(super) fn zero(&self) -> Point {
-        plus(self.shift(), self.offsets[self.modes.system])
+        add(self.shift(), self.offsets[self.modes.system])
     }
 
     /// After a change of offsets: the tool stays, its coordinates change.
@@ -227,7 +227,7 @@ mod tests {
         machine.rotation = Some(Rotation { centre: [5.0, 0.0, 0.0], sin: 0.6, cos: 0.8 });
         let point = [7.0, -3.0, 11.0];
         let back = machine.backward(machine.forward(point));
-        assert!(minus(point, back).into_iter().all(|difference| difference.abs() < 1e-12));
+        assert!(sub(point, back).into_iter().all(|difference| difference.abs() < 1e-12));
         assert_eq!(machine.arc_flips(Plane::Xy), Ok(false));
     }
 }

@@ -7,7 +7,7 @@ use super::interpreter::Interpreter;
 use super::machine::Motion;
 use super::memory::Spline;
 use crate::toolpath::model::{Kind, Plane};
-use crate::toolpath::vector::{Point, length, minus, plus, times};
+use crate::toolpath::vector::{Point, add, length, scale, sub};
 
 /// Lines of a span, at most.
 const LINES_MOST: usize = 4096;
@@ -27,15 +27,15 @@ impl Interpreter<'_> {
         let to = self.target(block)?;
         let word = |letter| block.get(letter).map(|value| value * unit);
         let first = match (word(b'i'), word(b'j'), self.spline.last) {
-            (None, None, Some(last)) if is_cubic => times(last, -1.0),
+            (None, None, Some(last)) if is_cubic => scale(last, -1.0),
             (None, None, _) => return refused("G5 without I, J"),
             (i, j, _) => [i.unwrap_or(0.0), j.unwrap_or(0.0), 0.0],
         };
-        let first = plus(from, first);
+        let first = add(from, first);
         let points = if is_cubic {
             let (Some(p), Some(q)) = (word(b'p'), word(b'q')) else { return refused("G5 without P, Q") };
             self.spline.last = Some([p, q, 0.0]);
-            vec![from, first, plus(to, [p, q, 0.0]), to]
+            vec![from, first, add(to, [p, q, 0.0]), to]
         } else {
             vec![from, first, to]
         };
@@ -117,7 +117,7 @@ impl Interpreter<'_> {
     fn flatten(&mut self, points: &[(Point, f64)], knots: &[f64], order: usize) -> Result<(), Fault> {
         let tolerance = self.options.tolerance.max(1e-6);
         let start = point(points, knots, order, order - 1, knots[order - 1]);
-        if length(minus(start, self.machine.position)) > tolerance {
+        if length(sub(start, self.machine.position)) > tolerance {
             self.line_to(Kind::Feed, start)?;
         }
         let spans: Vec<usize> = (order - 1..points.len()).filter(|span| knots[*span] < knots[span + 1]).collect();
@@ -141,7 +141,7 @@ fn lines_of(at: &impl Fn(f64) -> Point, tolerance: f64) -> usize {
     const TRIED: usize = 8;
     let off = |line: usize| {
         let [a, m, b] = [0.0, 0.5, 1.0].map(|part| at((line as f64 + part) / TRIED as f64));
-        length(minus(m, times(plus(a, b), 0.5)))
+        length(sub(m, scale(add(a, b), 0.5)))
     };
     let worst = (0..TRIED).map(off).fold(0.0, f64::max);
     let lines = TRIED as f64 * (1.25 * worst / tolerance).sqrt();

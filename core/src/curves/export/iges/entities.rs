@@ -93,7 +93,7 @@ fn plane(points: &[Point]) -> Option<Point> {
     let axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     let across = if is_line { axes.map(|axis| cross(along, axis)).into_iter().fold([0.0; 3], longest) } else { across };
     let normal = unit(across)?;
-    // One that is an axis, to the last bit, is told as that.
+    // A normal that is an axis, to the last bit, is told as that.
     let normal = axes.into_iter().find(|axis| distance(*axis, normal.map(f64::abs)) < 1e-15).unwrap_or(normal);
     offsets().all(|offset| dot(offset, normal).abs() <= 1e-12 * size).then_some(normal)
 }

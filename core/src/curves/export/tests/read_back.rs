@@ -24,18 +24,7 @@ fn spline(curve: &Curve) -> &Spline {
     spline
 }
 
-/// Files for another kernel, in the folder that the environment names.
-#[test]
-#[ignore = "writes files"]
-fn samples_are_written() {
-    let folder = std::env::var("SAMPLES").unwrap();
-    for (name, body) in all() {
-        std::fs::write(format!("{folder}/{name}.igs"), iges(&body)).unwrap();
-        std::fs::write(format!("{folder}/{name}.stp"), step(&body)).unwrap();
-    }
-}
-
-/// What our own reader says is odd, but for surfaces, which it does not keep.
+/// The oddities that our own reader tells, but for surfaces, which it does not keep.
 fn oddities(network: &Network) -> Vec<&str> {
     let texts = network.findings.iter().map(|finding| finding.text.as_str());
     let is_expected = |text: &&str| text.contains("surface") || text.contains("space of parameters");
@@ -121,7 +110,7 @@ fn step_refers_backwards() {
     }
 }
 
-/// What hangs together is a shell: closed where each edge is used twice.
+/// Faces that hang together are a shell: closed where each edge is used twice.
 #[test]
 fn closed_shells_are_solids() {
     let solids = |body: &Body| step(body).matches("MANIFOLD_SOLID_BREP").count();

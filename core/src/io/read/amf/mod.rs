@@ -34,6 +34,7 @@ use super::number::COMMA;
 use super::parsed::{Besides, Parsed, Part};
 use super::spool::Context;
 use crate::contract::error::Result;
+use crate::util::legible::in_one_line;
 use crate::util::words::{Count, Counted};
 use constellation::Names;
 use document::{Document, LONGEST_NAME};
@@ -267,7 +268,7 @@ fn harmless(text: String) -> Finding {
 /// A name as a result has it, without control characters. Bytes that are no UTF-8 are of Latin-1, as old programs write.
 fn title(text: &[u8]) -> String {
     let text = String::from_utf8(text.to_vec()).unwrap_or_else(|_| text.iter().map(|byte| char::from(*byte)).collect());
-    text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect()
+    in_one_line(&text)
 }
 
 /// Text of a file for people: short, and without control characters.

@@ -9,6 +9,7 @@ use super::super::spool::Items;
 use super::super::xml::Scopes;
 use super::roles::Roles;
 use super::transform::Transform;
+use crate::util::legible::in_one_line;
 
 /// The unit of all coordinates of a part (3MF Core 3.3).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -172,8 +173,7 @@ impl Model {
     /// The title of the whole in its metadata (3MF Core 1.3, section 3.4.1), or nothing; without control characters.
     pub(crate) fn title(&self) -> String {
         let all = self.parts.first().map_or(&[][..], |part| &part.metadata);
-        let title = all.iter().find(|(name, _)| name == "Title").map_or("", |(_, value)| value.trim());
-        title.chars().map(|c| if c.is_control() { ' ' } else { c }).collect()
+        in_one_line(all.iter().find(|(name, _)| name == "Title").map_or("", |(_, value)| value.trim()))
     }
 
     /// The unit of the whole.

@@ -1,6 +1,6 @@
 //! Small systems of linear equations and symmetric eigenproblems.
 
-/// Solves `matrix · x = right` by Gauss's elimination with row pivots; `None` where a pivot is below 10⁻¹³ of the largest entry.
+/// Solves `matrix · x = right` by Gauss's elimination with row pivots; `None` where a pivot is below 10⁻¹³ of the largest entry, or a result is no number.
 pub(crate) fn solve<const N: usize>(mut matrix: [[f64; N]; N], mut right: [f64; N]) -> Option<[f64; N]> {
     let largest = matrix.iter().flatten().fold(0.0_f64, |most, x| most.max(x.abs()));
     for k in 0..N {
@@ -21,7 +21,7 @@ pub(crate) fn solve<const N: usize>(mut matrix: [[f64; N]; N], mut right: [f64; 
         let rest: f64 = (k + 1..N).map(|j| matrix[k][j] * right[j]).sum();
         right[k] = (right[k] - rest) / matrix[k][k];
     }
-    Some(right)
+    right.iter().all(|x| x.is_finite()).then_some(right)
 }
 
 /// Eigenvalues of a symmetric matrix, least first, and the vectors to them: cyclic Jacobi rotations (Golub, Van Loan, Matrix
@@ -77,5 +77,11 @@ mod tests {
         let [(low, first), (high, _)] = eigen([[2.0, 1.0], [1.0, 2.0]]);
         assert!((low - 1.0).abs() < 1e-12 && (high - 3.0).abs() < 1e-12);
         assert!((first[0] + first[1]).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_system_is_solved_and_a_singular_one_refused() {
+        assert_eq!(solve([[0.0, 2.0], [4.0, 0.0]], [2.0, 8.0]), Some([2.0, 1.0]));
+        assert_eq!(solve([[1.0, 2.0], [2.0, 4.0]], [1.0, 2.0]), None);
     }
 }

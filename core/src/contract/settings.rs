@@ -256,11 +256,11 @@ pub enum PatchShape {
     /// Refined, then fair: position, tangent and curvature continue the surface around (least change of mean curvature).
     #[default]
     Fair,
+    /// Refined, then moved onto a surface that a triharmonic radial basis function continues.
+    Implicit,
     /// Refined, then on the surface that blends the sides of the rim between its corners, whatever the surface around does: for rims that are edges of
     /// a part. Of a rim with less than two corners, as `Fair`.
     Coons,
-    /// Refined, then moved onto a surface that a triharmonic radial basis function continues.
-    Implicit,
 }
 
 impl Default for Profile {

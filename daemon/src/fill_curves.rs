@@ -1,7 +1,9 @@
 //! `suture fill-curves`: surfaces between curves of CAD programs, as a mesh or as surfaces.
 
+mod sketch;
+
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
 use suture_core::curves::fill::{self, FilledNetwork, Method, Options};
@@ -53,11 +55,15 @@ pub(crate) fn run(args: &FillCurvesArgs) -> Exit {
 
 fn fill(args: &FillCurvesArgs) -> Result<Done, String> {
     let kind = kind_of(&args.output)?;
-    naming::check_one(std::slice::from_ref(&args.input), &args.output, args.force)?;
-    let shown = args.input.display();
-    let bytes = std::fs::read(&args.input).map_err(|error| format!("{shown}: cannot be read: {error}"))?;
-    let network = curves::read(&bytes).map_err(|error| format!("{shown}: cannot be read as curves: {error}"))?;
-    drop(bytes);
+    // No format of results ends so: the picture never goes over the result.
+    if let Some(path) = args.picture.as_ref().filter(|path| path.extension().is_none_or(|ending| ending != "png")) {
+        return Err(format!("{}: a picture's name ends with .png", path.display()));
+    }
+    for path in std::iter::once(&args.output).chain(&args.picture) {
+        naming::check_one(&args.inputs, path, args.force)?;
+    }
+    let network = read(&args.inputs)?;
+    let shown = shown(args);
     let mut how = loops::Options::default();
     how.closes_gaps = args.close_gaps.is_some();
     how.longest_gap = args.close_gaps.unwrap_or_default();
@@ -71,7 +77,37 @@ fn fill(args: &FillCurvesArgs) -> Result<Done, String> {
         ));
     }
     let (left, mesh) = write(args, kind, &network, &filled)?;
+    if let Some(path) = &args.picture {
+        sketch::write(path, (&network, &filled, &left), args)?;
+    }
     Ok(Done { network, filled, left, mesh })
+}
+
+/// All files as one network.
+fn read(inputs: &[PathBuf]) -> Result<Network, String> {
+    let mut whole: Option<Network> = None;
+    for path in inputs {
+        let shown = path.display();
+        let bytes = std::fs::read(path).map_err(|error| format!("{shown}: cannot be read: {error}"))?;
+        let network = curves::read(&bytes).map_err(|error| format!("{shown}: cannot be read as curves: {error}"))?;
+        match &mut whole {
+            Some(whole) => whole.append(network),
+            None => whole = Some(network),
+        }
+    }
+    whole.ok_or_else(|| "no file of curves".into())
+}
+
+/// The inputs for people.
+fn shown(args: &FillCurvesArgs) -> String {
+    let [first, others @ ..] = args.inputs.as_slice() else { return String::new() };
+    let more = Counted(others.len() as u64, "other file", "other files");
+    if others.is_empty() { first.display().to_string() } else { format!("{} and {more}", first.display()) }
+}
+
+/// The first input, whose name and rights the result has.
+fn first(args: &FillCurvesArgs) -> &Path {
+    args.inputs.first().map_or(Path::new(""), PathBuf::as_path)
 }
 
 fn kind_of(output: &Path) -> Result<Kind, String> {
@@ -112,16 +148,16 @@ fn write_mesh(
     let draft = Draft::new(fsx::folder_of(output)).map_err(failed)?;
     let mut limits = args.spend.limits(false);
     limits.spool.get_or_insert_with(|| fsx::folder_of(output).to_owned());
-    let of = (args.input.as_path(), &filled.filled, network.unit.millimetres);
+    let of = (first(args), &filled.filled, network.unit.millimetres);
     let mesh = suture_core::write_curve_mesh(of, (&draft.path(), format), &limits, &Quiet).map_err(|error| error.to_string())?;
-    draft.place_like(&args.input, output, args.force).map_err(failed)?;
+    draft.place_like(first(args), output, args.force).map_err(failed)?;
     Ok(mesh)
 }
 
 fn write_surfaces(args: &FillCurvesArgs, kind: Kind, network: &Network, filled: &FilledNetwork) -> Result<Vec<usize>, String> {
     let shown = args.output.display();
     let (body, left) = fill::body(&filled.shapes(network), &filled.outlines, &filled.filled, &network.unit);
-    let name = args.input.file_stem().unwrap_or_default().to_string_lossy();
+    let name = first(args).file_stem().unwrap_or_default().to_string_lossy();
     let header = export::Header { name: &name, time: None, system: concat!("Suture ", env!("CARGO_PKG_VERSION")) };
     let mut text = Vec::new();
     let written = if kind == Kind::Iges {
@@ -156,7 +192,7 @@ fn as_text(args: &FillCurvesArgs, done: &Done) -> String {
     let made =
         mesh.as_ref().map_or_else(|| "surfaces".to_owned(), |mesh| words::triangles(mesh.report.input.triangles).to_string());
     let from = if filled.loops.is_none() { "faces of the file" } else { "loops of its curves" };
-    let mut lines = vec![format!("{}: {outlines} ({from}) -> {}: {made}", args.input.display(), args.output.display())];
+    let mut lines = vec![format!("{}: {outlines} ({from}) -> {}: {made}", shown(args), args.output.display())];
     if mesh.is_some() && network.unit.millimetres != 1.0 {
         lines.push(format!("  unit    {unit}, {} mm; the mesh is in millimetres", network.unit.millimetres));
     }
@@ -220,8 +256,9 @@ fn as_json(args: &FillCurvesArgs, done: &Done) -> Value {
     };
     let outlines = filled.outlines.iter().zip(&filled.filled.reports).enumerate().map(outline);
     json!({
-        "input": args.input.to_string_lossy(),
+        "inputs": args.inputs.iter().map(|path| path.to_string_lossy()).collect::<Vec<_>>(),
         "output": args.output.to_string_lossy(),
+        "picture": args.picture.as_ref().map(|path| path.to_string_lossy()),
         "unit": network.unit.name,
         "millimetres": network.unit.millimetres,
         "outlines": outlines.collect::<Vec<_>>(),

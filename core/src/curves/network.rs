@@ -2,7 +2,7 @@
 
 use crate::curves::curve::{self, Curve, Source};
 use crate::curves::finding::Finding;
-use crate::curves::vector::{Point, is_finite};
+use crate::curves::vector::{Affine, Point, is_finite};
 
 /// The unit of length of a file.
 #[derive(Clone, Debug, PartialEq)]
@@ -69,6 +69,27 @@ impl Network {
         }
         bounds.into_iter().all(is_finite).then_some(bounds)
     }
+
+    /// Adds the curves and faces of another file, in the unit of this one. Ends of the two meet by place: vertices of the other file are dropped, for its
+    /// numbers mean nothing here. O(its curves).
+    pub fn append(&mut self, other: Self) {
+        let factor = other.unit.millimetres / self.unit.millimetres;
+        let first = self.curves.len();
+        let scaled = |curve: Curve| {
+            let shape = if factor == 1.0 { curve.shape } else { curve.shape.transformed(&Affine::scaling(factor)) };
+            Curve { shape, vertices: None, ..curve }
+        };
+        self.curves.extend(other.curves.into_iter().map(scaled));
+        let mut faces = other.faces;
+        for used in faces.iter_mut().flat_map(|face| std::iter::once(&mut face.outer).chain(&mut face.inner)).flatten() {
+            used.curve += first;
+        }
+        self.faces.extend(faces);
+        let resolution = other.resolution.map(|length| length * factor);
+        self.resolution = self.resolution.into_iter().chain(resolution).reduce(f64::max);
+        self.digits = self.digits.min(other.digits);
+        self.findings.extend(other.findings);
+    }
 }
 
 /// Why nothing of a file is read.
@@ -95,4 +116,22 @@ pub enum ReadError {
         /// The fault, in words.
         problem: String,
     },
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::curves::loops::{self, Options};
+
+    /// Three sides of a square in millimetres, and the fourth one in metres: together they are one loop.
+    #[test]
+    fn files_of_different_units_form_one_loop() {
+        let read = |text: &str| crate::curves::read(text.as_bytes()).unwrap();
+        let mut network = read(
+            r#"{"unit": "mm", "curves": [{"line": [[0, 0, 0], [1, 0, 0]]}, {"line": [[1, 0, 0], [1, 1, 0]]}, {"line": [[1, 1, 0], [0, 1, 0]]}]}"#,
+        );
+        network.append(read(r#"{"unit": "m", "curves": [{"line": [[0, 0.001, 0], [0, 0, 0]]}]}"#));
+        assert_eq!(network.bounds(), Some([[0.0; 3], [1.0, 1.0, 0.0]]));
+        let found = loops::find(&network, &Options::default());
+        assert_eq!(found.loops.iter().map(|own| own.uses.len()).collect::<Vec<_>>(), [4]);
+    }
 }

@@ -118,9 +118,9 @@ pub(crate) struct DefeatureArgs {
 
 #[derive(Args, Debug)]
 pub(crate) struct FillCurvesArgs {
-    /// File of curves: IGES, STEP, or JSON of knots and control points
-    #[arg(value_name = "CURVES")]
-    pub input: PathBuf,
+    /// Files of curves: IGES, STEP, or JSON of knots and control points; several are filled as if they were one, in the unit of the first
+    #[arg(required = true, value_name = "CURVES")]
+    pub inputs: Vec<PathBuf>,
     /// Where to write: a mesh (stl, 3mf, ply, off, obj, amf; in millimetres), or surfaces (igs, step), by its ending
     #[arg(short, long, value_name = "OUT")]
     pub output: PathBuf,
@@ -142,6 +142,9 @@ pub(crate) struct FillCurvesArgs {
     /// The longest edge of the mesh [default: by the curves]
     #[arg(long, value_name = "LENGTH", value_parser = parse_length)]
     pub edge: Option<f64>,
+    /// Draw the curves, and beside them the surfaces that fill them: red are curves of no surface, green those that close gaps
+    #[arg(long, value_name = "PNG")]
+    pub picture: Option<PathBuf>,
     #[command(flatten)]
     pub spend: Spend,
     /// Print JSON instead of a table: each outline, and the report of the mesh

@@ -17,6 +17,7 @@ mod edges;
 mod known;
 mod mix;
 mod parts;
+pub(crate) mod strokes;
 
 use std::io;
 use std::path::Path;
@@ -29,6 +30,7 @@ pub(crate) use camera::Eye;
 use camera::{Bounds, Camera};
 use canvas::Canvas;
 use known::Known;
+use strokes::{Mark, Stroke};
 
 /// Samples along the side of a pixel.
 const SAMPLES: usize = 3;
@@ -100,12 +102,27 @@ pub(crate) fn draw(meshes: &[&[Record]], options: &Options) -> Option<Picture> {
         .iter()
         .zip(&known)
         .enumerate()
-        .map(|(i, (records, others))| Panel { records, others: others.as_ref(), is_after: i > 0 })
+        .map(|(i, (records, others))| Panel { records, others: others.as_ref(), is_after: i > 0, strokes: &[] })
         .collect();
     let eye = options.eye.unwrap_or_else(|| choose(&panels, threads));
+    side_by_side(&panels, eye, options)
+}
+
+/// Draws curves, and beside them a mesh with the curves that it does not hide. `None` where nothing is finite.
+pub(crate) fn draw_curves(strokes: &[Stroke], mesh: &[Record], options: &Options) -> Option<Picture> {
+    // Triangles without an area: the camera sees where they are, and the canvas draws nothing of them.
+    let chords = strokes.iter().flat_map(|stroke| stroke.points.windows(2));
+    let chords: Vec<Record> = chords.map(|ends| record::encode([ends[0], ends[1], ends[1]], 0)).collect();
+    let panels = [chords.as_slice(), mesh].map(|records| Panel { records, others: None, is_after: false, strokes });
+    side_by_side(&panels, options.eye.unwrap_or(Eye::USUAL), options)
+}
+
+/// Panels from left to right, all seen by one camera.
+fn side_by_side(panels: &[Panel<'_>], eye: Eye, options: &Options) -> Option<Picture> {
     let eye = if options.behind { eye.opposite() } else { eye };
     let (width, height) = options.size;
-    let camera = Camera::fitted(eye, meshes, threads, width * SAMPLES, height * SAMPLES)?;
+    let meshes: Vec<&[Record]> = panels.iter().map(|panel| panel.records).collect();
+    let camera = Camera::fitted(eye, &meshes, options.threads.max(1), width * SAMPLES, height * SAMPLES)?;
     let mut picture =
         Picture { width: width * panels.len(), height, pixels: vec![[255; 3]; width * panels.len() * height], one_in: 1 };
     for (i, panel) in panels.iter().enumerate() {
@@ -147,6 +164,15 @@ const INSIDE: [f64; 3] = [240.0, 150.0, 50.0];
 const GOES: [f64; 3] = [178.0, 132.0, 214.0];
 const NEW: [f64; 3] = [92.0, 184.0, 112.0];
 const BOUNDARY: [f64; 3] = [214.0, 10.0, 40.0];
+const CURVE: [f64; 3] = [52.0, 66.0, 92.0];
+
+fn paint_of(mark: Mark) -> [f64; 3] {
+    match mark {
+        Mark::Bounds => CURVE,
+        Mark::Added => NEW,
+        Mark::Left => BOUNDARY,
+    }
+}
 
 /// A mesh to be drawn.
 struct Panel<'a> {
@@ -154,6 +180,8 @@ struct Panel<'a> {
     /// The triangles of the other one.
     others: Option<&'a Known>,
     is_after: bool,
+    /// Lines that are drawn besides.
+    strokes: &'a [Stroke],
 }
 
 impl Panel<'_> {
@@ -180,14 +208,14 @@ impl Panel<'_> {
             })
             .collect();
         for ends in edges::boundary(self.records, options.threads.max(1), options.memory / 2) {
-            self.line(&canvas, ends, &mut samples);
+            line(&canvas, ends, BOUNDARY, &mut samples);
+        }
+        for stroke in self.strokes {
+            for ends in stroke.points.windows(2) {
+                line(&canvas, [ends[0], ends[1]], paint_of(stroke.mark), &mut samples);
+            }
         }
         (pixels(&samples, canvas.camera.width), one_in)
-    }
-
-    fn line(&self, canvas: &Canvas, ends: [Point; 2], samples: &mut [[u8; 3]]) {
-        let samples_of_line = SAMPLES as f64;
-        canvas.line(ends, 0.65 * samples_of_line, 2.5 * samples_of_line, &mut |at| samples[at] = BOUNDARY.map(|x| x as u8));
     }
 
     fn colour(&self, camera: &Camera, triangle: u32) -> [f64; 3] {
@@ -200,6 +228,11 @@ impl Panel<'_> {
         };
         paint.map(|x| (x * (ambient + (1.0 - ambient) * lit) * 1.12).min(255.0))
     }
+}
+
+fn line(canvas: &Canvas, ends: [Point; 2], paint: [f64; 3], samples: &mut [[u8; 3]]) {
+    let samples_of_line = SAMPLES as f64;
+    canvas.line(ends, 0.65 * samples_of_line, 2.5 * samples_of_line, &mut |at| samples[at] = paint.map(|x| x as u8));
 }
 
 /// Means of the samples of each pixel, of rows of so many samples.

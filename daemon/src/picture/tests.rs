@@ -130,3 +130,26 @@ fn from_the_opposite_side_one_sees_the_other_faces() {
     assert!(seen[0] > 300 && seen[1] < 30, "{seen:?}");
     assert!(count(&of(true), is_grey) > 300);
 }
+
+/// A square of lines, one of them of no surface, and the square as two triangles.
+#[test]
+fn curves_are_drawn_in_their_colours_beside_their_mesh() {
+    let corners = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]];
+    let mark = |k: usize| if k == 0 { Mark::Left } else { Mark::Bounds };
+    let strokes: Vec<Stroke> = (0..4).map(|k| Stroke { points: vec![corners[k], corners[(k + 1) % 4]], mark: mark(k) }).collect();
+    let mesh = [[0, 1, 2], [0, 2, 3]].map(|face: [usize; 3]| encode(face.map(|k| corners[k]), 0));
+    let eye = Some(Eye { around: -90.0, above: 90.0 });
+    let options = Options { size: (100, 100), eye, behind: false, threads: 1, memory: 1 << 30 };
+    let picture = draw_curves(&strokes, &mesh, &options).unwrap();
+    let at = |x: usize, y: usize| picture.pixels[y * 200 + x];
+    assert_eq!((picture.width, picture.height), (200, 100));
+    // The left panel is paper within its lines, the right one is not.
+    assert_eq!(at(50, 50), [255; 3]);
+    assert!(at(150, 50)[0] < 250);
+    // Lines share their pixels with paper.
+    let has = |is_painted: fn([u8; 3]) -> bool, from: usize| (0..100).any(|y| (from..from + 100).any(|x| is_painted(at(x, y))));
+    let is_red = |[red, green, _]: [u8; 3]| red > 200 && green < 130;
+    let is_dark = |[red, _, blue]: [u8; 3]| red < 140 && blue < 170;
+    assert!(has(is_red, 0) && has(is_dark, 0) && has(is_dark, 100));
+    assert!(draw_curves(&[], &[], &options).is_none());
+}

@@ -3,7 +3,7 @@
 //! A target fails on a panic, on more memory than [`MOST_MEMORY`], on a reading that differs from the first one of the same bytes, and on a
 //! report that is no report. libFuzzer adds the time.
 //!
-//! The readers are the engine's own files, those of its folders `io` and `curves` and of the folders that this one may import.
+//! The readers are the engine's own files, those of its folders `io`, `curves` and `toolpath` and of the folders that this one may import.
 
 #[path = "../../../core/src/attributes/mod.rs"]
 mod attributes;
@@ -19,6 +19,8 @@ mod memory;
 pub mod seeds;
 #[path = "../../src/stl.rs"]
 mod stl;
+#[path = "../../../core/src/toolpath/mod.rs"]
+mod toolpath;
 #[path = "../../../core/src/util/mod.rs"]
 mod util;
 #[path = "../../src/zip.rs"]
@@ -33,6 +35,7 @@ use crate::contract::access::Access;
 use crate::contract::error::{Error, ErrorClass};
 use crate::contract::progress::Progress;
 use crate::contract::settings::{Limits, Profile};
+use crate::curves::fill::Options;
 use crate::io::read::Finding;
 use crate::io::read::fuzzing::{self, Made};
 use crate::io::rows::fuzzing as rows;
@@ -128,6 +131,83 @@ pub fn check_curves(bytes: &[u8]) {
         let length = curve.shape.length(1e-6);
         assert!(length >= 0.0, "a length of {length}");
         let _ = curve.shape.to_spline();
+    }
+}
+
+/// Points within a surface, at most: a short file of huge curves asks for as many as it may.
+const INNER: usize = 500;
+
+/// Fills the loops of curves, twice, and writes their surfaces in both forms.
+pub fn check_filled(bytes: &[u8]) {
+    alone();
+    let Ok(network) = curves::read(bytes) else { return };
+    for from_faces in [true, false] {
+        let how = curves::loops::Options { closes_gaps: !from_faces, ..Default::default() };
+        let options = Options { inner: INNER, ..Options::default() };
+        let filled = || curves::fill::fill_network(&network, (from_faces, &how), &options);
+        let (Ok(first), Ok(again)) = (within_bounds(bytes.len(), filled), filled()) else { continue };
+        assert!(first.filled == again.filled, "two fillings of the same curves differ");
+        let mesh = &first.filled.mesh;
+        assert!(
+            mesh.triangles.iter().flatten().all(|corner| (*corner as usize) < mesh.points.len()),
+            "a corner is a point that is there"
+        );
+        assert!(mesh.points.iter().flatten().all(|x| x.is_finite()), "points are numbers");
+        assert_eq!(first.filled.surfaces.len(), first.outlines.len());
+        let (body, _) = curves::fill::body(&first.shapes(&network), &first.outlines, &first.filled, &network.unit);
+        let header = curves::export::Header { name: "fuzz", time: None, system: "fuzz" };
+        let mut text = Vec::new();
+        for written in
+            [curves::export::write_iges(&body, &header, &mut text), curves::export::write_step(&body, &header, &mut text)]
+        {
+            if let Err(error) = written {
+                one_line(&error.to_string());
+            }
+        }
+    }
+}
+
+/// Moves and executed blocks of a tool path, at most: what their own bounds allow takes longer than an input has.
+const MOVES: u64 = 1_000_000;
+
+/// Reads a tool path, twice; its moves go by one by one, and memory does not grow with them.
+pub fn check_path(bytes: &[u8]) {
+    let options = toolpath::Options { moves_max: MOVES, steps_max: MOVES, ..Default::default() };
+    let read = || {
+        let (mut moves, mut mixed) = (0_u64, 0_u64);
+        let header = within_bounds(bytes.len(), || {
+            toolpath::stream(bytes, &options, &mut |one| {
+                moves += 1;
+                for x in one.from.into_iter().chain(one.to).chain(one.axis) {
+                    assert!(x.is_finite(), "a move of line {} to {x}", one.line);
+                    mixed = mixed.rotate_left(7) ^ x.to_bits();
+                }
+                std::ops::ControlFlow::Continue(())
+            })
+        });
+        (header, moves, mixed)
+    };
+    let first = read();
+    assert!(first == read(), "two readings of the same bytes differ");
+    match &first.0 {
+        Ok(header) => header.findings.iter().for_each(|finding| one_line(&finding.text)),
+        Err(error) => one_line(&error.to_string()),
+    }
+}
+
+/// Reads a project of CAMotics, a table of tools, and a tool of the command line.
+pub fn check_tools(bytes: &[u8]) {
+    let said = |error: &toolpath::ReadError| one_line(&error.to_string());
+    let project = || within_bounds(bytes.len(), || toolpath::project::read(bytes));
+    let first = project();
+    assert!(first == project(), "two readings of the same bytes differ");
+    let _ = first.map_err(|error| said(&error));
+    match within_bounds(bytes.len(), || toolpath::tools::read_table(bytes, toolpath::Units::Millimetres)) {
+        Ok((_, findings)) => findings.iter().for_each(|finding| one_line(&finding.text)),
+        Err(error) => said(&error),
+    }
+    if let Ok(text) = std::str::from_utf8(bytes) {
+        let _ = toolpath::tools::parse(text).map_err(|error| said(&error));
     }
 }
 

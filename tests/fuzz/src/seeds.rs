@@ -33,8 +33,38 @@ pub fn all() -> Vec<(&'static str, Vec<Vec<u8>>)> {
         ("threemf_parts", vec![parts(&boxes)]),
         ("iges", vec![iges(&IGES), iges(&[])]),
         ("step", STEP.map(|data| step(data).into_bytes()).to_vec()),
+        ("fill", with(Vec::new(), &FILL)),
+        ("gcode", with(Vec::new(), &GCODE)),
+        ("apt", with(Vec::new(), &APT)),
+        ("path_tools", with(Vec::new(), &TOOLS)),
     ]
 }
+
+/// Loops: in a plane, of four sides in space, of a circle and its chord.
+const FILL: [&str; 3] = [
+    r#"{"unit":"mm","curves":[{"line":[[0,0,0],[4,0,0]]},{"line":[[4,0,0],[0,3,0]]},{"line":[[0,3,0],[0,0,0]]}]}"#,
+    r#"{"unit":"mm","curves":[{"degree":2,"knots":[0,0,0,1,1,1],"points":[[0,0,0],[2,0,1],[4,0,0]]},{"line":[[4,0,0],[4,4,1]]},{"degree":3,"knots":[0,0,0,0,1,1,1,1],"points":[[4,4,1],[3,4,2],[1,5,0],[0,4,0]]},{"line":[[0,4,0],[0,0,0]]}]}"#,
+    r#"{"unit":"inch","curves":[{"degree":2,"knots":[0,0,0,1,1,1],"weights":[1,0.7071067811865476,1],"points":[[1,0,0],[1,1,0],[0,1,0]]},{"line":[[0,1,0],[1,0,0]]}]}"#,
+];
+
+const GCODE: [&str; 4] = [
+    "%\nO1\nG21 G90 G17\nT1 M6 (flat 6 mm)\nG0 X0 Y0 Z5\nG1 Z-1 F100\nG2 X10 Y0 I5 J0\nG3 X0 Y0 R5\nG41 D1 X5\nG40\nG81 X1 Y1 Z-2 R1\nG80\nM98 P2\nM30\nO2\nG91 X1\nM99\n%\n",
+    "#1=0\no100 while [#1 lt 5]\nG1 X[#1*2] Y[sin[#1]] F50\n#1=[#1+1]\no100 endwhile\no<a> sub\nG1 Z[#1]\no<a> endsub\no<a> call [3]\nM2\n",
+    "G20 G18\nG5 I0 J3 P0 Q-3 X1 Y1\nG5.2 X0 Y1 L3\nX2 Y2\nG5.3\nG68 X0 Y0 R45\nG51 X0 Y0 P2\n",
+    "; T3 D=6 CR=3 - ball end mill\nN10 G0 X1. Y2.\nN20 G73 Z-3 R2 Q1\n$H\n",
+];
+
+const APT: [&str; 2] = [
+    "PARTNO TEST\nUNITS/MM\nCUTTER/6,3,0,3,0,0,20\nLOADTL/1\nFROM/0,0,10\nRAPID\nGOTO/0,0,1\nFEDRAT/100\nGODLTA/1,2,-3\nCIRCLE/5,0,0,0,0,1,5\nGOTO/10,0,0\nTLAXIS/0,0,1\nMULTAX/ON\nGOTO/1,2,3,0,0,1\nFINI\n",
+    "$$-> CUTTER / 0.5\nUNITS / INCHES\nGOTO / 1.0, 2.0, $\n 3.0\nCYCLE/DRILL,5,MMPM,100,2\nGOTO/1,1,0\nCYCLE/OFF\nFINI\n",
+];
+
+const TOOLS: [&str; 4] = [
+    r#"{"units":"metric","nc-files":["a.nc"],"tools":{"1":{"shape":"ballnose","diameter":6,"length":20}},"workpiece":{"bounds":{"min":[0,0,0],"max":[1,1,1]}}}"#,
+    "T1 P1 D6.0 Z20 ;flat\nT2 P2 D3 Z10 ;ball\n",
+    "3=ball,d=6",
+    "2=taper,d=1,angle=15,l=20",
+];
 
 /// Entities of an IGES: type, form, matrix, parameters.
 type Entity<'a> = (u32, u32, u32, &'a str);
@@ -199,5 +229,6 @@ fn parts(triangles: &[Triangle]) -> Vec<u8> {
     let roles = "<config><object id=\"2\"><part id=\"5\" subtype=\"negative_part\"><mesh_stat/></part><part id=\"5\" subtype=\"normal_part\"/></object></config>";
     let sound = forms::parts(&model, &[]);
     let [types, rels] = [0, 1].map(|k| sound[k].1);
-    [types, rels, model.as_bytes(), relationships.as_bytes(), other.as_bytes(), config.as_bytes(), roles.as_bytes()].join(&BETWEEN)
+    [types, rels, model.as_bytes(), relationships.as_bytes(), other.as_bytes(), config.as_bytes(), roles.as_bytes()]
+        .join(&BETWEEN)
 }

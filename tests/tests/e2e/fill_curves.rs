@@ -73,3 +73,31 @@ fn a_square_within_a_square_bounds_a_hole_and_curves_without_a_loop_are_refused(
     assert!(refused.contains("no closed loop") && !place.at("open.stl").exists(), "{refused}");
     place.suture(["fill-curves", "open.json", "-o", "open.stl", "--close-gaps", "5"]).expect(0);
 }
+
+/// The first ten edges of a cuboid in one file, the last two and a loose one in another, in inches.
+#[test]
+fn several_files_are_one_network_and_their_picture_stands_beside_the_result() {
+    let place = Place::new();
+    let all: Value = serde_json::from_str(&cuboid([2.0, 3.0, 4.0])).unwrap();
+    let curves = all["curves"].as_array().unwrap();
+    let inches = |curve: &Value| {
+        let ends = curve["line"].as_array().unwrap().iter();
+        let ends = ends.map(|end| end.as_array().unwrap().iter().map(|x| x.as_f64().unwrap() / 25.4).collect::<Vec<_>>());
+        json!({ "line": ends.collect::<Vec<_>>() })
+    };
+    let loose = json!({ "line": [[0.2, 0.2, 0.2], [0.3, 0.2, 0.2]] });
+    place.put("first.json", json!({ "unit": "mm", "curves": curves[..10] }).to_string().as_bytes());
+    let last: Vec<Value> = curves[10..].iter().map(inches).chain([loose]).collect();
+    place.put("last.json", json!({ "unit": "inch", "curves": last }).to_string().as_bytes());
+    let told = told(&place, &["first.json", "last.json", "-o", "out.stl", "--picture", "out.png"]);
+    assert_eq!(
+        (told["mesh"]["verdict"]["good"].as_bool(), told["outlines"].as_array().unwrap().len()),
+        (Some(true), 6),
+        "{told}"
+    );
+    assert!((told["mesh"]["before"]["volume"].as_f64().unwrap() - 24.0).abs() < 1e-5, "{told}");
+    assert!(std::fs::read(place.at("out.png")).unwrap().starts_with(b"\x89PNG"));
+    // An input is never written over, nor is a result by its picture.
+    let refused = place.suture(["fill-curves", "first.json", "last.json", "-o", "new.stl", "--picture", "last.json", "--force"]);
+    assert!(refused.expect(2).stderr().contains("ends with .png") && !place.at("new.stl").exists());
+}

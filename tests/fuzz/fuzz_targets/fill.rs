@@ -1,0 +1,6 @@
+//! Curves in JSON, filled and written as surfaces.
+#![no_main]
+
+use libfuzzer_sys::fuzz_target;
+
+fuzz_target!(|bytes: &[u8]| suture_fuzz::check_filled(bytes));

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
-use suture_core::curves::fill::{self, FilledNetwork, Method, Options};
+use suture_core::curves::fill::{self, Continuity, FilledNetwork, Method, Options};
 use suture_core::curves::{self, Network, export, loops};
 use suture_core::words::{self, Counted};
 use suture_core::{CurveMesh, OutputFormat, Quiet};
@@ -69,6 +69,8 @@ fn fill(args: &FillCurvesArgs) -> Result<Done, String> {
     how.longest_gap = args.close_gaps.unwrap_or_default();
     let mut options = Options::default();
     (options.tolerance, options.chord, options.size) = (args.tolerance, args.chord, args.edge);
+    options.continuity = if args.tangent { Continuity::Tangent } else { Continuity::Position };
+    options.fans = !matches!(kind, Kind::Mesh(_));
     options.angle = args.angle.map_or(options.angle, f64::to_radians);
     let filled = fill::fill_network(&network, (!args.loops, &how), &options).map_err(|error| format!("{shown}: {error}"))?;
     if filled.outlines.is_empty() {
@@ -180,6 +182,7 @@ fn name(method: Method) -> &'static str {
         Method::Ruled => "ruled between two sides",
         Method::Heights => "heights over a plane",
         Method::Centre => "ruled to a centre",
+        Method::Fans => "each curve ruled to a centre",
         _ => "no surface",
     }
 }
@@ -205,6 +208,13 @@ fn as_text(args: &FillCurvesArgs, done: &Done) -> String {
         let of = Counted(count, "outline", "outlines");
         let within = if method == Method::Fallback { String::new() } else { format!(", curves within {error:.1e} {unit} of it") };
         lines.push(format!("  filled  {}: {of}{within}", name(method)));
+    }
+    let bent: Vec<_> = filled.filled.reports.iter().filter(|report| report.tangent > 0).collect();
+    if !bent.is_empty() {
+        let curves = Counted(bent.iter().map(|report| report.tangent as u64).sum(), "curve", "curves");
+        let kink = bent.iter().fold(0.0_f64, |most, report| most.max(report.kink)).to_degrees();
+        let of = Counted(bent.len() as u64, "outline", "outlines");
+        lines.push(format!("  tangent along {curves} of {of}, normals within {kink:.1e} degrees of those beside"));
     }
     if let Some(mesh) = mesh {
         if !mesh.closed_as_holes.is_empty() {
@@ -248,6 +258,8 @@ fn as_json(args: &FillCurvesArgs, done: &Done) -> Value {
             "error": report.error,
             "chord": report.chord,
             "gap": report.gap,
+            "tangent": report.tangent,
+            "kink": report.kink,
             "folded": report.is_folded,
             "ambiguous": report.is_ambiguous,
             "problem": report.problem.as_ref().map(ToString::to_string),

@@ -139,6 +139,9 @@ pub(crate) struct FillCurvesArgs {
     /// How much curves may turn along an edge of the mesh, in degrees [default: 20]
     #[arg(long, value_name = "DEGREES", value_parser = parse_length)]
     pub angle: Option<f64>,
+    /// Give blended surfaces the tangent planes of the surfaces beside them
+    #[arg(long)]
+    pub tangent: bool,
     /// The longest edge of the mesh [default: by the curves]
     #[arg(long, value_name = "LENGTH", value_parser = parse_length)]
     pub edge: Option<f64>,

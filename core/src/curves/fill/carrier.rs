@@ -77,6 +77,28 @@ impl Carrier {
     }
 }
 
+impl Carrier {
+    /// A vector across it at a point that is on it; `None` where it has none, as at an apex.
+    pub(super) fn normal(&self, point: Point) -> Option<Point> {
+        let outside = |frame: &Frame, vector: Point| sub(frame.outside(vector), frame.origin);
+        let (Self::Plane(frame)
+        | Self::Cylinder { frame, .. }
+        | Self::Cone { frame, .. }
+        | Self::Sphere { frame, .. }
+        | Self::Torus { frame, .. }) = self;
+        let [x, y, z] = frame.inside(point);
+        let wide = x.hypot(y);
+        let vector = match self {
+            Self::Plane(_) => [0.0, 0.0, 1.0],
+            Self::Cylinder { .. } => [x, y, 0.0],
+            Self::Cone { slope, .. } => [x, y, -slope * wide],
+            Self::Sphere { .. } => [x, y, z],
+            Self::Torus { major, .. } => [x * (1.0 - major / wide), y * (1.0 - major / wide), z],
+        };
+        unit(outside(frame, vector))
+    }
+}
+
 /// Distance from the axis of a frame, and height.
 pub(super) fn round(frame: &Frame, point: Point) -> [f64; 2] {
     let [x, y, z] = frame.inside(point);

@@ -4,6 +4,7 @@ use std::f64::consts::TAU;
 
 use super::carrier::Carrier;
 use super::coons::Coons;
+use super::fan::Fan;
 use super::plate::Plate;
 use super::space::Frame;
 use crate::curves::curve::Spline;
@@ -23,6 +24,8 @@ pub(super) enum Chart {
     Heights(Frame, Option<Box<Plate>>),
     /// A disc of a radius: around it a closed curve, in its middle a point, straight between.
     Disc(Box<Spline>, Point, f64),
+    /// A part of a cone over a polyline, unrolled.
+    Fan(Box<Fan>),
 }
 
 /// Cylinder, cone and torus: an angle and another coordinate, in which a turn counts as often as it is made.
@@ -173,7 +176,7 @@ impl Chart {
                 [x * share, y * share]
             }
             Self::Turned(turned) => turned.flat(turned.coordinates(point)),
-            Self::Coons(..) | Self::Disc(..) => [0.0; 2],
+            Self::Coons(..) | Self::Disc(..) | Self::Fan(..) => [0.0; 2],
         }
     }
 
@@ -193,6 +196,7 @@ impl Chart {
                 let around = y.atan2(x).rem_euclid(TAU) / TAU;
                 between(*centre, curve.point_and_derivative(around).0, x.hypot(y) / radius)
             }
+            Self::Fan(fan) => fan.point(place),
             Self::Heights(frame, plate) => {
                 frame.outside([place[0], place[1], plate.as_ref().map_or(0.0, |plate| plate.height(place))])
             }
@@ -204,7 +208,7 @@ impl Chart {
     pub(super) fn longest(&self, chord: f64, angle: f64) -> f64 {
         let bent = |radius: f64| (8.0 * chord * radius).sqrt().min(angle * radius);
         match self {
-            Self::Plane(_) | Self::Heights(..) | Self::Disc(..) => f64::INFINITY,
+            Self::Plane(_) | Self::Heights(..) | Self::Disc(..) | Self::Fan(..) => f64::INFINITY,
             Self::Sphere(_, radius) | Self::Turned(Turned::Cylinder(_, radius)) => bent(*radius),
             // Its radius changes; its edges along the rim are what they are.
             Self::Turned(Turned::Cone(..)) => f64::INFINITY,

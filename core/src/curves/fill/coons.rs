@@ -5,11 +5,14 @@
 
 use super::basis;
 use super::spline::SplineSurface;
+use super::sum::sum;
 use crate::curves::curve::{CurveError, Spline};
-use crate::curves::vector::{Point, add, cross, scale, sub};
+use crate::curves::vector::{Point, add, cross, norm, scale, sub};
 
 /// Control points of a surface, at most.
 const MOST: usize = 1 << 22;
+/// The width of a surface by its length that is rounding alone: of an outline that goes back the way it came.
+const THINNEST: f64 = 1e-12;
 
 /// A bilinearly blended Coons surface: ruled along v, and along u, less the bilinear surface of the four corners. Parameters are
 /// 0 to 1.
@@ -27,16 +30,17 @@ pub struct Coons {
     /// Of each curve of the outline: the number of its side, and where it begins and ends on that, 0 to 1 in the direction of the
     /// outline.
     pub spans: Vec<(usize, f64, f64)>,
-    /// A surface of revolution that nearly has these sides; blended is what it lacks then.
+    /// A surface to which another one is added: one of revolution that nearly has these sides, so that blended is what it lacks; or
+    /// what bends the blended surface into the tangent planes of its neighbours.
     pub base: Option<Box<Base>>,
 }
 
-/// A surface, and the Coons surface of what sides are beside its own.
+/// A surface, and the Coons surface that is added to it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Base {
     /// Of degree 3 both ways, on 0 to 1.
     pub surface: SplineSurface,
-    /// The difference.
+    /// What is added.
     pub rest: Coons,
 }
 
@@ -58,8 +62,8 @@ impl Coons {
         Ok(Self { along, across, corners, sides: sides.len(), spans, base: None })
     }
 
-    /// The surface with the same sides that differs from another one, of degree 3 both ways on 0 to 1, by what is blended of the differences
-    /// of their sides. O(control points).
+    /// The surface with the same sides that differs from another one, of degree 3 both ways on 0 to 1, by what is blended of the
+    /// differences of their sides. O(control points).
     pub(super) fn on(mut self, surface: SplineSurface) -> Result<Self, CurveError> {
         let [u, v] = surface.knots();
         let end = |row: &Vec<Point>, is_last: bool| if is_last { row.last() } else { row.first() }.copied();
@@ -74,6 +78,13 @@ impl Coons {
         let rest = Self { along, across, corners, sides: self.sides, spans: Vec::new(), base: None };
         self.base = Some(Box::new(Base { surface, rest }));
         Ok(self)
+    }
+
+    /// The sum of this surface and one of degree 3 both ways on 0 to 1, which is 0 along its sides.
+    pub(super) fn bent(mut self, surface: SplineSurface) -> Self {
+        let rest = self.clone();
+        self.base = Some(Box::new(Base { surface, rest }));
+        self
     }
 
     /// Parameters of a place on a side of the outline.
@@ -165,14 +176,17 @@ impl Coons {
         SplineSurface::new([3, 3], [u, v], points, None)
     }
 
-    /// Whether it folds: where its normal, on a grid of `count` × `count` inner points, turns away from the mean normal.
+    /// Whether it folds, or is no wider than rounding makes it: where its normal, on a grid of `count` × `count` inner points,
+    /// turns away from the mean normal.
     #[must_use]
     pub fn is_folded(&self, count: u32) -> bool {
         let at = |number: u32| (f64::from(number) + 0.5) / f64::from(count);
         let ts: Vec<f64> = (0..count).map(at).collect();
-        let rows = self.grid(&ts, &ts);
-        let normals: Vec<Point> = rows.into_iter().flatten().map(|(_, [du, dv])| cross(du, dv)).collect();
-        super::space::turns_away(&normals)
+        let slopes: Vec<[Point; 2]> = self.grid(&ts, &ts).into_iter().flatten().map(|(_, slopes)| slopes).collect();
+        let normals: Vec<Point> = slopes.iter().map(|[du, dv]| cross(*du, *dv)).collect();
+        let longest = |all: &mut dyn Iterator<Item = &Point>| all.fold(0.0_f64, |most, one| most.max(norm(*one)));
+        let size = longest(&mut slopes.iter().flatten());
+        longest(&mut normals.iter()) <= THINNEST * size * size || super::space::turns_away(&normals)
     }
 }
 
@@ -183,17 +197,7 @@ impl Base {
     }
 
     fn to_spline(&self) -> Result<SplineSurface, CurveError> {
-        let rest = self.rest.to_spline()?;
-        let ([u, v], [p, q]) = (rest.knots(), self.surface.knots());
-        let rows: Vec<Vec<Point>> = self.surface.points().iter().map(|row| basis::refined(3, q, row, v)).collect();
-        let mut points = rest.points().to_vec();
-        for at in 0..points.first().map_or(0, Vec::len) {
-            let column: Vec<Point> = rows.iter().filter_map(|row| row.get(at).copied()).collect();
-            for (row, more) in points.iter_mut().zip(basis::refined(3, p, &column, u)) {
-                row.iter_mut().skip(at).take(1).for_each(|point| *point = add(*point, more));
-            }
-        }
-        SplineSurface::new([3, 3], [u.clone(), v.clone()], points, None)
+        sum(&self.rest.to_spline()?, &self.surface)
     }
 }
 
@@ -255,6 +259,13 @@ mod tests {
             prop_assert!(distance(jet.point, point) < 1e-12 && distance(jet.first[0], du) < 1e-10 && distance(jet.first[1],
                 dv) < 1e-10);
         }
+    }
+
+    /// An outline that goes back the way it came has no width.
+    #[test]
+    fn a_slit_is_no_surface() {
+        let bent = side([0.1, 0.2, 0.3], [1.3, 0.7, 0.1], [0.3, 0.1, 0.7], 0.4);
+        assert!(Coons::new(&[bent.clone(), bent.reversed()], Vec::new()).unwrap().is_folded(8));
     }
 
     /// Straight sides of a square do not fold; with the order of two corners changed, they do.

@@ -5,12 +5,14 @@ use rayon::prelude::*;
 use super::layout::Corner;
 use super::mesh::Mesh;
 use super::network::{self, Strands};
-use super::options::{Options, Outline};
+use super::options::{Continuity, Options, Outline};
 use super::orient;
 use super::patch::{Patch, Task};
 use super::report::{Report, Surface};
 use super::strand::Strand;
+use super::tangent::{self, Beside};
 use crate::curves::curve::{Shape, Spline};
+use crate::curves::vector::Point;
 
 /// Filled outlines.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -47,21 +49,50 @@ pub enum FillError {
 ///
 /// Each curve is divided once, by the finest wish of its outlines. An outline in a plane is trimmed from it; one on a cylinder,
 /// cone, sphere or torus, from that; others are Coons surfaces of two to four sides, upon a surface of revolution where one nearly
-/// has these; where they fold, heights of a thin plate over a plane; where that crosses itself, a cone to a centre. What folds then
-/// is left, [`Surface::Fallback`].
+/// has these, and with the tangent planes of their neighbours where [`Options::continuity`] asks for them; where they fold, heights of
+/// a thin plate over a plane; where that crosses itself, a cone to a centre, or one for each curve, if no curves cross as seen from
+/// there. What folds then is left, [`Surface::Fallback`].
 ///
 /// O(points · log points), in parallel over curves and outlines.
 ///
 /// # Errors
 /// [`FillError`] of curves that do not exist, and of too many points.
 pub fn fill(shapes: &[&Shape], outlines: &[Outline], options: &Options) -> Result<Filled, FillError> {
+    fill_beside(shapes, outlines, &[], options)
+}
+
+/// As [`fill`], beside faces that are none of the outlines, whose tangent planes blended surfaces get with [`Continuity::Tangent`].
+///
+/// # Errors
+/// As [`fill`].
+///
+/// [`Continuity::Tangent`]: super::Continuity::Tangent
+pub fn fill_beside(
+    shapes: &[&Shape],
+    outlines: &[Outline],
+    beside: &[Beside<'_>],
+    options: &Options,
+) -> Result<Filled, FillError> {
     let strands = strands(shapes, outlines)?;
     let divided = network::divide(&strands, outlines, options);
-    let tasks = outlines.par_iter().zip(&divided.rings).zip(&divided.wanted);
-    let patches: Vec<Patch> = tasks
-        .map(|((outline, rings), &(longest, chord))| Task { outline, strands: &strands, rings, options, longest, chord }.run())
+    let tasks = outlines.iter().zip(&divided.rings).zip(&divided.wanted);
+    let tasks: Vec<Task<'_>> = tasks
+        .map(|((outline, rings), &(longest, chord))| Task { outline, strands: &strands, rings, options, longest, chord })
         .collect();
-    let mut filled = Filled { mesh: Mesh { points: divided.points, ..Mesh::default() }, ..Filled::default() };
+    let mut patches: Vec<Patch> = tasks.par_iter().map(Task::run).collect();
+    if options.continuity == Continuity::Tangent {
+        tangent::bend(&tasks, &mut patches, beside);
+    }
+    collected(divided.points, patches, (strands, outlines))
+}
+
+/// All patches as one mesh.
+fn collected(
+    points: Vec<Point>,
+    patches: Vec<Patch>,
+    (strands, outlines): (Strands<'_>, &[Outline]),
+) -> Result<Filled, FillError> {
+    let mut filled = Filled { mesh: Mesh { points, ..Mesh::default() }, ..Filled::default() };
     for (number, patch) in patches.into_iter().enumerate() {
         let first = filled.mesh.points.len();
         if first + patch.points.len() >= u32::MAX as usize {
@@ -102,7 +133,7 @@ fn strands<'a>(shapes: &[&'a Shape], outlines: &[Outline]) -> Result<Strands<'a>
 /// Fitted curves of outlines whose surfaces are blended from them.
 fn used(strands: Strands<'_>, outlines: &[Outline], surfaces: &[Surface]) -> Vec<Option<Spline>> {
     let mut is_used = vec![false; strands.len()];
-    let blended = |surface: &Surface| matches!(surface, Surface::Coons(_) | Surface::Centre { .. });
+    let blended = |surface: &Surface| matches!(surface, Surface::Coons(_) | Surface::Centre { .. } | Surface::Fans { .. });
     for (outline, _) in outlines.iter().zip(surfaces).filter(|(_, surface)| blended(surface)) {
         for one in &outline.outer {
             is_used.iter_mut().skip(one.curve).take(1).for_each(|used| *used = true);

@@ -3,11 +3,16 @@
 use crate::curves::loops::Loop;
 use crate::curves::{Face, Use};
 
+/// How near fitted curves are where tangent planes are wanted, in lengths: the error of a cubic B-spline's tangent grows as its own
+/// one to the power of 3/4, and 10⁻⁸ makes 10⁻⁶ of it.
+const NEAR: f64 = 1e-8;
+
 /// What is wanted. Lengths are in the unit of the curves.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Options {
-    /// How far fitted curves may be from their own; `None`: 5 · 10⁻⁷ of the length of each.
+    /// How far fitted curves may be from their own; `None`: 5 · 10⁻⁷ of the length of each, and 10⁻⁸ where tangent planes are wanted,
+    /// of which they are off by about 10⁻⁶ then.
     pub tolerance: Option<f64>,
     /// How far curves may be from a plane, cylinder, cone, sphere or torus that is taken for their surface; `None`: 10⁻⁵ of the
     /// outline's size, or the gaps between its curves.
@@ -24,6 +29,24 @@ pub struct Options {
     pub size: Option<f64>,
     /// Points of the mesh within a surface, at most, or four times those of its outline if that is more.
     pub inner: usize,
+    /// How surfaces meet what is beside them.
+    pub continuity: Continuity,
+    /// Whether an outline that nothing else fits gets a surface for each of its curves, to a centre. Files of surfaces need one; in a mesh, the filling of
+    /// holes keeps clear of other faces, and such a cone may not.
+    pub fans: bool,
+}
+
+/// How a surface that is blended from its curves meets its neighbours.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Continuity {
+    /// In the curves that they share.
+    #[default]
+    Position,
+    /// With the same tangent planes, where these are known and where the sides that meet at the ends of a curve lie in them (up to
+    /// the angle of [`Options::smooth`], which fades along the curve): those of planes, cylinders, cones, spheres and tori, those
+    /// that are given, and between two blended surfaces the planes halfway between both.
+    Tangent,
 }
 
 impl Default for Options {
@@ -37,7 +60,17 @@ impl Default for Options {
             angle: 0.35,
             size: None,
             inner: 100_000,
+            continuity: Continuity::Position,
+            fans: true,
         }
+    }
+}
+
+impl Options {
+    /// How far the fitted curve of one of a length may be from it; `None` where nothing is said.
+    pub(super) fn fit(&self, length: f64) -> Option<f64> {
+        let near = (self.continuity == Continuity::Tangent).then_some(NEAR * length);
+        self.tolerance.or(near)
     }
 }
 

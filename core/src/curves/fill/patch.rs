@@ -2,6 +2,8 @@
 
 use super::blend::{self, Curves};
 use super::carrier::{self, Carrier};
+use super::coons::Coons;
+use super::fans;
 use super::fit::FitError;
 use super::improve::Improved;
 use super::layout::{self, Corner, Layout, Rim};
@@ -9,6 +11,7 @@ use super::options::{Options, Outline};
 use super::report::{Method, Problem, Report, Surface};
 use super::sides;
 use super::space;
+use super::star;
 use super::strand::{Kind, Strand};
 use super::triangles;
 use crate::curves::Use;
@@ -62,6 +65,8 @@ impl<'a> Task<'a> {
             error: 0.0,
             chord: self.sag(),
             gap: self.gap(),
+            tangent: 0,
+            kink: 0.0,
             is_folded: false,
             is_ambiguous: self.is_ambiguous(),
             is_flipped: false,
@@ -115,12 +120,13 @@ impl<'a> Task<'a> {
                 curves
             }
             Err(problem) => {
-                report.problem = Some(problem.into());
-                return None;
+                let found = self.fans(report);
+                report.problem = found.is_none().then_some(problem.into());
+                return found;
             }
         };
-        let found =
-            self.coons(&curves, corners, report).or_else(|| self.heights(report)).or_else(|| self.centre(&curves, report));
+        let found = self.coons(&curves, corners, report).or_else(|| self.heights(report));
+        let found = found.or_else(|| self.centre(&curves, report)).or_else(|| self.fans(report));
         report.problem = found.is_none().then_some(Problem::Folds);
         found
     }
@@ -145,6 +151,17 @@ impl<'a> Task<'a> {
         None
     }
 
+    /// The same outline on a Coons surface that has been bent; `None` if that cannot be laid flat.
+    pub(super) fn bent(&self, coons: Coons, report: Report) -> Option<Patch> {
+        let mut lengths = vec![0.0; coons.sides];
+        for (one, (side, ..)) in self.outline.outer.iter().zip(&coons.spans) {
+            let length = self.strands.get(one.curve).and_then(Option::as_ref).map_or(0.0, |strand| strand.length);
+            lengths.iter_mut().skip(*side).take(1).for_each(|sum| *sum += length);
+        }
+        let (points, triangles) = self.mesh(blend::laid(coons.clone(), &lengths, self.rings.first()?))?;
+        Some(Patch { surface: Surface::Coons(Box::new(coons)), report, points, triangles })
+    }
+
     fn heights(&self, report: &mut Report) -> Option<(Surface, Meshed)> {
         let count = self.rings.iter().map(Vec::len).sum::<usize>() as f64;
         if count * count > COSTLIEST {
@@ -159,12 +176,37 @@ impl<'a> Task<'a> {
 
     fn centre(&self, curves: &Curves, report: &mut Report) -> Option<(Surface, Meshed)> {
         let blend::Cone { layout, curve, ends, centre } = blend::centre(curves, self.rings.first()?).ok()?;
-        if blend::is_folded(&curve, centre) {
+        if blend::is_folded(&curve, centre) || !self.is_star(centre) {
             return None;
         }
         let meshed = self.mesh(layout)?;
         report.method = Method::Centre;
         Some((Surface::Centre { curve: Box::new(curve), ends, centre }, meshed))
+    }
+
+    /// Whether no two edges of the outline cross as seen from a point.
+    fn is_star(&self, centre: Point) -> bool {
+        let ring: Vec<Point> = self.rings.iter().take(1).flatten().map(|rim| rim.point).collect();
+        star::is_star(&ring, centre)
+    }
+
+    /// A surface for each curve to a centre.
+    fn fans(&self, report: &mut Report) -> Option<(Surface, Meshed)> {
+        let ring = self.rings.first()?;
+        let parts: Vec<(&Strand<'_>, Use)> = self.uses().collect();
+        let centre = fans::centre(&parts);
+        if !self.options.fans || !self.is_star(centre) {
+            return None;
+        }
+        let curves = parts.iter().map(|(strand, one)| fans::curve(strand, one, self.options)).collect::<Option<_>>()?;
+        let mut whole = fans::Spokes::new(ring, centre, self.options.inner);
+        for part in fans::parts(ring, centre) {
+            let (layout, rims) = whole.laid(&part);
+            let alone = Task { rings: &[rims], ..*self };
+            whole.take(&part, alone.mesh(layout)?);
+        }
+        report.method = Method::Fans;
+        Some((Surface::Fans { curves, centre }, (whole.points, whole.triangles)))
     }
 
     fn mesh(&self, layout: Layout) -> Option<Meshed> {
@@ -210,7 +252,7 @@ impl<'a> Task<'a> {
         let mut largest = 0.0_f64;
         for one in &self.outline.outer {
             let Some(strand) = self.strands.get(one.curve).and_then(Option::as_ref) else { continue };
-            let (spline, error) = strand.fitted(self.options.tolerance).as_ref().map_err(Clone::clone)?;
+            let (spline, error) = strand.fitted(self.options.fit(strand.length)).as_ref().map_err(Clone::clone)?;
             largest = largest.max(*error);
             let spline = if one.is_reversed { spline.clone().reversed() } else { spline.clone() };
             parts.push((spline, strand.length));

@@ -25,6 +25,8 @@ pub enum Method {
     Heights,
     /// Straight from the outline to a point in its middle.
     Centre,
+    /// The same with a surface for each curve, where the one over all curves folds.
+    Fans,
     /// By none: the outline is left to the filling of mesh holes.
     Fallback,
 }
@@ -45,6 +47,13 @@ pub enum Surface {
         curve: Box<Spline>,
         /// Where each curve of the outline begins on it, and 1.
         ends: Vec<f64>,
+        /// The point at v = 0.
+        centre: Point,
+    },
+    /// Straight from each curve to a point, a surface each: `centre + v (curve(u) − centre)`.
+    Fans {
+        /// In the order and the direction of the outline, as they were fitted, or exact where that failed.
+        curves: Vec<Spline>,
         /// The point at v = 0.
         centre: Point,
     },
@@ -87,6 +96,11 @@ pub struct Report {
     pub chord: f64,
     /// The largest distance between ends of curves that follow each other.
     pub gap: f64,
+    /// Curves along which its surface has been given the tangent planes of what is beside it.
+    pub tangent: usize,
+    /// The largest angle there between its normals and those of what is beside it, radians, at samples. Of two blended surfaces it is
+    /// that to the planes halfway.
+    pub kink: f64,
     /// Whether a Coons surface of it folds.
     pub is_folded: bool,
     /// Whether other simple surfaces have the same outline: its curve is a circle, or its curves are two circles around one axis.

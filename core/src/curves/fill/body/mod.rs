@@ -28,7 +28,8 @@ use crate::curves::export::{Body, Face};
 /// given to `fill`, and what it gave.
 ///
 /// Faces look the way that their triangles do, so a closed network is a solid. The tolerance is the largest of gaps, errors and
-/// distances between ends of curves and vertices. O(control points of curves and surfaces).
+/// distances between ends of curves and vertices. An outline with a surface for each curve has a face for each. O(control points
+/// of curves and surfaces).
 #[must_use]
 pub fn body(shapes: &[&Shape], outlines: &[Outline], filled: &Filled, unit: &Unit) -> (Body, Vec<usize>) {
     let mut edges = Edges::new(shapes, outlines, filled);
@@ -42,10 +43,10 @@ pub fn body(shapes: &[&Shape], outlines: &[Outline], filled: &Filled, unit: &Uni
     for (number, ((outline, surface), report)) in outlines.iter().zip(&filled.surfaces).zip(&filled.reports).enumerate() {
         let found = face(&mut edges, outline, surface, report.is_flipped);
         let is_closed = |face: &Face| std::iter::once(&face.outer).chain(&face.inner).all(|ring| edges.is_closed(ring));
-        match found.filter(is_closed) {
-            Some(face) => {
+        match found.filter(|found| found.iter().all(is_closed)) {
+            Some(found) => {
                 edges.tolerance = edges.tolerance.max(report.error);
-                faces.push(face);
+                faces.extend(found);
             }
             None => left.push(number),
         }
@@ -54,14 +55,16 @@ pub fn body(shapes: &[&Shape], outlines: &[Outline], filled: &Filled, unit: &Uni
     (body, left)
 }
 
-fn face(edges: &mut Edges, outline: &Outline, surface: &Surface, is_flipped: bool) -> Option<Face> {
-    match surface {
+fn face(edges: &mut Edges, outline: &Outline, surface: &Surface, is_flipped: bool) -> Option<Vec<Face>> {
+    let one = match surface {
         Surface::Carrier(carrier) => {
             let rings = edges.rings(outline, is_flipped)?;
             trim::face(edges, carrier, rings)
         }
         Surface::Coons(coons) => whole::of_coons(edges, coons, outline, is_flipped),
         Surface::Centre { curve, ends, centre } => whole::of_centre(edges, curve, ends, *centre, outline, is_flipped),
+        Surface::Fans { centre, .. } => return whole::of_fans(edges, *centre, outline, is_flipped),
         Surface::Heights(_) | Surface::Fallback(_) => None,
-    }
+    };
+    Some(vec![one?])
 }

@@ -145,3 +145,25 @@ fn blended_surfaces_are_whole() {
     assert!(is_closed(&body));
     assert_eq!(filled.curves.iter().flatten().count(), 6);
 }
+
+/// The seam of a tennis ball in four curves, of which one runs against the outline: a face for each, and one vertex in the middle.
+#[test]
+fn fans_are_faces_that_share_spokes() {
+    let point = |t: f64| [t.cos() + 0.4 * (3.0 * t).cos(), t.sin() - 0.4 * (3.0 * t).sin(), 1.2 * (2.0 * t).sin()];
+    let wire = |from: f64, to: f64| {
+        curves::fill::fit(
+            &Shape::polyline((0..=40).map(|at| point(from + (to - from) * f64::from(at) / 40.0)).collect()).unwrap(),
+            1e-3,
+        )
+    };
+    let quarters =
+        [(0.0, 1.0), (2.0, 1.0), (2.0, 3.0), (3.0, 4.0)].map(|(a, b)| wire(a * FRAC_PI_2, b * FRAC_PI_2).unwrap().spline);
+    let shapes = quarters.map(Shape::Spline);
+    let (filled, body) = checked(&shapes, &[outline(&[1, -2, 3, 4])]);
+    assert!(matches!(&filled.surfaces[0], curves::fill::Surface::Fans { curves, .. } if curves.len() == 4));
+    assert_eq!((body.vertices.len(), body.edges.len(), body.faces.len()), (5, 8, 4));
+    // Spokes are passed twice, once in each direction.
+    let mut counts = [[0; 2]; 8];
+    body.faces.iter().flat_map(loops).flatten().for_each(|one| counts[one.edge][usize::from(one.is_reversed)] += 1);
+    assert_eq!(counts.iter().filter(|count| **count == [1, 1]).count(), 4);
+}

@@ -1,5 +1,7 @@
 //! Surfaces whose own sides are their outlines.
 
+use std::collections::BTreeMap;
+
 use crate::curves::curve::Spline;
 use crate::curves::export::{EdgeUse, Face, Surface};
 use crate::curves::vector::Point;
@@ -45,6 +47,44 @@ pub(super) fn of_centre(
         outer.push(EdgeUse { edge, is_reversed, pcurve });
     }
     Some(Face { surface: plain(&surface), outer, inner: Vec::new(), is_same_sense: is_flipped })
+}
+
+/// Cones over the edges of an outline, which share the spokes between them.
+pub(super) fn of_fans(edges: &mut Edges, centre: Point, outline: &Outline, is_flipped: bool) -> Option<Vec<Face>> {
+    let all: Vec<EdgeUse> = outline.outer.iter().map(|one| edges.uses(one)).collect::<Option<Vec<_>>>()?.concat();
+    let tip = edges.add_vertex(centre);
+    let mut spokes: BTreeMap<usize, (usize, Spline)> = BTreeMap::new();
+    let mut faces = Vec::with_capacity(all.len());
+    for part in all {
+        let curve = edges.curve(&part)?.clone().clamped().ok()?;
+        let [from, to] = edges.ends(&part)?;
+        let rows = curve.points().iter().map(|point| vec![centre, *point]).collect();
+        let weights = curve.weights().map(|weights| weights.iter().map(|weight| vec![*weight; 2]).collect());
+        let knots = [curve.knots().to_vec(), vec![0.0, 0.0, 1.0, 1.0]];
+        let surface = SplineSurface::new([curve.degree(), 1], knots, rows, weights).ok()?;
+        let [low, high] = curve.domain();
+        let [start, end] = if part.is_reversed { [high, low] } else { [low, high] };
+        let mut outer = vec![EdgeUse { pcurve: straight(&curve, [[low, 1.0], [high, 1.0]]), ..part.clone() }];
+        for (vertex, u, is_reversed) in [(to, end, true), (from, start, false)] {
+            let (edge, spoke) = match spokes.get(&vertex) {
+                Some(known) => known.clone(),
+                None => {
+                    let point = edges.vertices.get(vertex).copied()?;
+                    let spoke = Spline::new(1, vec![0.0, 0.0, 1.0, 1.0], vec![centre, point], None, None).ok()?;
+                    let known = (edges.add(spoke.clone(), [tip, vertex]), spoke);
+                    spokes.insert(vertex, known.clone());
+                    known
+                }
+            };
+            outer.push(EdgeUse { edge, is_reversed, pcurve: straight(&spoke, [[u, 0.0], [u, 1.0]]) });
+        }
+        if is_flipped {
+            turn(&mut outer);
+        }
+        // The surface runs with its edge, which may run against the outline.
+        faces.push(Face { surface: plain(&surface), outer, inner: Vec::new(), is_same_sense: is_flipped != part.is_reversed });
+    }
+    Some(faces)
 }
 
 /// The loop with straight curves of parameters between those that each curve of the outline has at its ends, in the outline's

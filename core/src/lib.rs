@@ -29,7 +29,11 @@ mod geometry;
 pub mod internals;
 mod io;
 mod output;
+mod proof;
 mod repairs;
+pub mod residue;
+mod simplify;
+mod smooth;
 mod stream;
 mod submesh;
 #[cfg(test)]
@@ -44,6 +48,7 @@ pub use contract::error::{Error, ErrorClass};
 pub use contract::progress::{Progress, Quiet};
 pub use contract::ranges::ProfileError;
 pub use contract::report::{FaceOrigin, RepairName, Report};
+pub use contract::residue_settings::ResidueSettings;
 pub use contract::settings::{
     Bodies, Guarantee, Hollow, KeepAttributes, Limits, OutputFormat, PatchShape, Profile, Sheets, Spill,
 };

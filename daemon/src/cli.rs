@@ -10,7 +10,7 @@ use suture_store::Priority;
 use suture_store::job::Kind;
 
 use crate::units::{parse_duration, parse_listen, parse_size};
-use meshes::{ConvertArgs, DefeatureArgs, FillCurvesArgs, InspectArgs, RepairArgs};
+use meshes::{ConvertArgs, DefeatureArgs, FillCurvesArgs, InspectArgs, RepairArgs, ResidueArgs, SimplifyArgs, SmoothArgs};
 use service::{CompletionsArgs, CurvesArgs, ManArgs, NightArgs, StatusArgs, StoreArgs, TopArgs};
 use spend::Spend;
 
@@ -53,6 +53,12 @@ pub(crate) enum Command {
     Repair(RepairArgs),
     /// Repair files, and remove small holes, fillets, grooves and bosses
     Defeature(DefeatureArgs),
+    /// Repair files, and make their triangles fewer, within a proved distance
+    Simplify(SimplifyArgs),
+    /// Repair files, and smooth their waves
+    Smooth(SmoothArgs),
+    /// Repair files, and remove what a milling tool left between its passes
+    Residue(ResidueArgs),
     /// Diagnose files and write nothing
     #[command(visible_alias = "check")]
     Inspect(InspectArgs),

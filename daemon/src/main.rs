@@ -71,6 +71,7 @@ mod schedule;
 mod sentinel;
 mod settings;
 mod settle;
+mod shaped;
 mod shown;
 mod signals;
 #[cfg(test)]
@@ -116,6 +117,9 @@ fn main() -> ExitCode {
     let exit = match &cli.command {
         Command::Repair(args) => single::repair(args),
         Command::Defeature(args) => single::defeature(args),
+        Command::Simplify(args) => single::simplify(args),
+        Command::Smooth(args) => single::smooth(args),
+        Command::Residue(args) => single::residue(args),
         Command::Inspect(args) => single::inspect(args),
         Command::Convert(args) => convert::run(args),
         Command::Curves(args) => curves::run(args),

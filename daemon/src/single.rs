@@ -7,7 +7,7 @@ use suture_core::report::Certificate;
 use suture_core::{OutputFormat, Profile};
 
 use crate::batch::Batch;
-use crate::cli::meshes::{DefeatureArgs, InspectArgs, RepairArgs};
+use crate::cli::meshes::{DefeatureArgs, InspectArgs, RepairArgs, ResidueArgs, SimplifyArgs, SmoothArgs};
 use crate::exit::Exit;
 use crate::fsx;
 use crate::item::Order;
@@ -38,6 +38,49 @@ pub(crate) fn defeature(args: &DefeatureArgs) -> Exit {
         let help =
             "give at least one of --holes-below, --fillets-below, --grooves-below, --bosses-below, or a profile that says it";
         if any { Ok(()) } else { Err(format!("no feature is to be removed: {help}")) }
+    })
+}
+
+/// Repairs every input, and makes its triangles fewer.
+pub(crate) fn simplify(args: &SimplifyArgs) -> Exit {
+    repair_under(&args.repair, |profile| {
+        if args.triangles.is_some() || args.ratio.is_some() || args.max_deviation.is_some() {
+            profile.simplify_triangles = args.triangles.unwrap_or(0);
+            profile.simplify_ratio = args.ratio.unwrap_or(0.0);
+            profile.simplify_within_mm = args.max_deviation.unwrap_or(0.0);
+        }
+        profile.keep_edges_degrees = args.keep_edges.unwrap_or(profile.keep_edges_degrees);
+        let is_wanted = profile.simplify_triangles > 0 || profile.simplify_ratio > 0.0 || profile.simplify_within_mm > 0.0;
+        let help = "give --triangles, --ratio or --max-deviation, or a profile that says it";
+        if is_wanted { Ok(()) } else { Err(format!("nothing says how few triangles are wanted: {help}")) }
+    })
+}
+
+/// Repairs every input, and smooths its waves.
+pub(crate) fn smooth(args: &SmoothArgs) -> Exit {
+    repair_under(&args.repair, |profile| {
+        profile.smooth_waves_below_mm = args.waves_below.unwrap_or(profile.smooth_waves_below_mm);
+        profile.smooth_leaves = args.leave.unwrap_or(profile.smooth_leaves);
+        profile.keep_edges_degrees = args.keep_edges.unwrap_or(profile.keep_edges_degrees);
+        let is_wanted = profile.smooth_waves_below_mm > 0.0;
+        let help = "give --waves-below, or a profile that says it";
+        if is_wanted { Ok(()) } else { Err(format!("nothing says which waves are to be smoothed: {help}")) }
+    })
+}
+
+/// Repairs every input, and removes the residue of a tool.
+pub(crate) fn residue(args: &ResidueArgs) -> Exit {
+    repair_under(&args.repair, |profile| {
+        if let Some(path) = &args.toolpath {
+            let text = path.to_str().ok_or_else(|| format!("{}: its name is no text", path.display()))?;
+            profile.residue.toolpath = text.into();
+        }
+        profile.residue.tools.extend(args.tools.iter().cloned());
+        profile.residue.tolerance_mm = args.tolerance.unwrap_or(profile.residue.tolerance_mm);
+        profile.residue.include.extend(&args.include);
+        profile.residue.exclude.extend(&args.exclude);
+        let help = "give --toolpath, or a profile that says it";
+        if profile.residue.toolpath.is_empty() { Err(format!("no tool path is named: {help}")) } else { Ok(()) }
     })
 }
 

@@ -8,6 +8,7 @@ use suture_core::report::{Defects, Format, Outcome, SelfIntersections, Task};
 use suture_core::words::triangles;
 
 use crate::say::plain;
+use crate::shaped;
 use crate::units::{show_box, show_count, show_number, show_point, show_seconds, show_size};
 
 /// Boundary loops, and pairs that intersect, listed before the table refers to the report.
@@ -67,6 +68,7 @@ pub(crate) fn render(report: &Report) -> String {
         let copied = if report.output.is_some() { ", copied byte for byte" } else { "" };
         line(&mut out, format_args!("{name}: clean{copied} ({}; {}; {})", size(report), report.verdict.statement, rate(report)));
         features(&mut out, report);
+        shaping(&mut out, report);
         hints(&mut out, report);
         return out;
     }
@@ -82,6 +84,7 @@ pub(crate) fn render(report: &Report) -> String {
         item(&mut out, "done", &format!("{}{times}{note}", repair.name.as_str().replace('_', " ")));
     }
     features(&mut out, report);
+    shaping(&mut out, report);
     for left in report.loops_left.iter().take(LOOPS_SHOWN) {
         let what = format!("loop of {} edges at {}: {}", show_count(left.edges), show_point(&left.at), left.reason);
         item(&mut out, "left", &what);
@@ -119,6 +122,13 @@ pub(crate) fn render(report: &Report) -> String {
 fn hints(out: &mut String, report: &Report) {
     for hint in &report.hints {
         item(out, "hint", &hint.text);
+    }
+}
+
+/// Residue, smoothing, fewer triangles.
+fn shaping(out: &mut String, report: &Report) {
+    for (word, line) in shaped::lines(report) {
+        item(out, word, &line);
     }
 }
 

@@ -20,6 +20,30 @@ fn split(text: &str) -> Option<(f64, &str)> {
 /// Reads a length in the units of a file.
 ///
 /// # Errors
+/// A box by two corners, as `0,0,0:10,10,5`; the least corner comes first in what is returned.
+///
+/// # Errors
+/// A line for people when the text is no box.
+pub(crate) fn parse_box(text: &str) -> Result<[[f64; 3]; 2], String> {
+    let bad = || format!("`{text}` is no box (try 0,0,0:10,10,5)");
+    let corner = |text: &str| -> Option<[f64; 3]> {
+        let numbers: Vec<f64> =
+            text.split(',').map(|x| x.trim().parse().ok().filter(|x: &f64| x.is_finite())).collect::<Option<_>>()?;
+        numbers.try_into().ok()
+    };
+    let (a, b) = text.split_once(':').and_then(|(a, b)| corner(a).zip(corner(b))).ok_or_else(bad)?;
+    Ok([std::array::from_fn(|axis| a[axis].min(b[axis])), std::array::from_fn(|axis| a[axis].max(b[axis]))])
+}
+
+/// A share of a whole, neither none of it nor all.
+///
+/// # Errors
+/// A line for people when the text is no such share.
+pub(crate) fn parse_share(text: &str) -> Result<f64, String> {
+    let share = text.parse::<f64>().ok().filter(|share| *share > 0.0 && *share < 1.0);
+    share.ok_or_else(|| "a share between 0 and 1, as 0.1".into())
+}
+
 /// A line for people when the text is no number above zero.
 pub(crate) fn parse_length(text: &str) -> Result<f64, String> {
     let length = text.trim().parse().ok().filter(|length: &f64| length.is_finite() && *length > 0.0);

@@ -39,6 +39,7 @@ mod e2e {
     mod rude;
     mod same_bytes;
     mod service;
+    mod shaping;
     mod soups;
     mod specials;
     mod steer;

@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 use imports::Imports;
 
 /// The folders of the engine, each of which may import those before it, and only those.
-const ROOMS: [&str; 17] = [
+const ROOMS: [&str; 21] = [
     "util",
     "contract",
     "curves",
@@ -29,6 +29,10 @@ const ROOMS: [&str; 17] = [
     "submesh",
     "detect",
     "algorithms",
+    "proof",
+    "simplify",
+    "smooth",
+    "residue",
     "output",
     "diagnosis",
     "repairs",

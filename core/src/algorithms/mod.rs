@@ -8,6 +8,7 @@
 
 pub(crate) mod extend;
 pub(crate) mod fairing;
+pub(crate) mod fans;
 pub(crate) mod thicken;
 pub(crate) mod triangulate;
 pub(crate) mod wrap;

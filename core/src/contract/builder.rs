@@ -2,6 +2,7 @@
 
 use crate::contract::loop_class::LoopClass;
 use crate::contract::ranges::ProfileError;
+use crate::contract::residue_settings::ResidueSettings;
 use crate::contract::settings::{
     Bodies, Guarantee, Hollow, KeepAttributes, Limits, OutputFormat, PatchShape, Profile, Sheets, Spill,
 };
@@ -101,6 +102,13 @@ impl ProfileBuilder {
         remove_fillets_below_mm: f64,
         remove_grooves_below_mm: f64,
         remove_bosses_below_mm: f64,
+        residue: ResidueSettings,
+        smooth_waves_below_mm: f64,
+        smooth_leaves: f64,
+        simplify_triangles: u64,
+        simplify_ratio: f64,
+        simplify_within_mm: f64,
+        keep_edges_degrees: f64,
     }
 }
 

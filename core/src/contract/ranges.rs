@@ -56,7 +56,8 @@ impl Profile {
     /// [`ProfileError`] names the first of these settings, its value and its range.
     pub fn validate(&self) -> Result<(), ProfileError> {
         let sides = self.build_volume_mm.map(|side| ("build_volume_mm", side, Range::Bound));
-        for (setting, value, range) in self.numbers().into_iter().chain(sides) {
+        let residue = [("residue.tolerance_mm", self.residue.tolerance_mm, Range::Bound)];
+        for (setting, value, range) in self.numbers().into_iter().chain(sides).chain(residue) {
             if !range.contains(value) {
                 return Err(ProfileError { setting, value, range: range.words() });
             }
@@ -65,7 +66,7 @@ impl Profile {
     }
 
     /// Every setting that is one number, not a whole one and not a choice, with its range.
-    fn numbers(&self) -> [(&'static str, f64, Range); 28] {
+    fn numbers(&self) -> [(&'static str, f64, Range); 33] {
         with_ranges![
             self;
             weld_relative: Share, weld_max_edge_share: Share, sew_relative: Share, gap_edge_share: Bound,
@@ -75,10 +76,11 @@ impl Profile {
             sheet_thickness_relative: Share, sheet_thickness_mm: Bound, max_sheets_share: Share,
             stack_gap_relative: Share, max_separation_relative: Share, wrap_max_share: Share, wrap_max_move: Bound,
             wrap_review_share: Share, thin_wall_mm: Bound,
-            remove_holes_below_mm: Bound, remove_fillets_below_mm: Bound, remove_grooves_below_mm: Bound, remove_bosses_below_mm: Bound;
+            remove_holes_below_mm: Bound, remove_fillets_below_mm: Bound, remove_grooves_below_mm: Bound, remove_bosses_below_mm: Bound,
+            smooth_waves_below_mm: Bound, smooth_leaves: Share, simplify_ratio: Share, simplify_within_mm: Bound, keep_edges_degrees: Bound;
             // Counts, each value of whose type means something, 0 and the largest included; several numbers; choices.
             others: name, max_hole_edges, max_bodies_lost, debris_triangles, build_volume_mm, repair, format, attributes, leave_open,
-            close_sheets, fill_holes, patch_shape, sheets, bodies, hollow, separate, guarantee, resolve_crossings, check_self_intersections,
+            close_sheets, residue, simplify_triangles, fill_holes, patch_shape, sheets, bodies, hollow, separate, guarantee, resolve_crossings, check_self_intersections,
         ]
     }
 }

@@ -73,6 +73,12 @@ pub enum RepairName {
     Wrap,
     /// Features below the sizes that the profile names were removed, and the faces around them continued.
     Defeature,
+    /// What a tool left between its passes was moved onto the surface that was meant.
+    Residue,
+    /// Waves shorter than the profile wants them were smoothed.
+    Smooth,
+    /// Triangles were made fewer, within a proved distance.
+    Simplify,
 }
 
 impl RepairName {
@@ -106,6 +112,9 @@ impl RepairName {
         Self::Rebuild,
         Self::Wrap,
         Self::Defeature,
+        Self::Residue,
+        Self::Smooth,
+        Self::Simplify,
     ];
 
     /// Words for its work, which follow "by".
@@ -139,6 +148,9 @@ impl RepairName {
             Self::Rebuild => "cutting places out and closing them anew",
             Self::Wrap => "wrapping regions",
             Self::Defeature => "removing small features",
+            Self::Residue => "removing what a tool left",
+            Self::Smooth => "smoothing",
+            Self::Simplify => "simplifying",
         }
     }
 
@@ -173,6 +185,9 @@ impl RepairName {
             Self::Rebuild => "rebuild",
             Self::Wrap => "wrap",
             Self::Defeature => "defeature",
+            Self::Residue => "residue",
+            Self::Smooth => "smooth",
+            Self::Simplify => "simplify",
         }
     }
 }
@@ -191,7 +206,7 @@ mod tests {
     #[test]
     fn every_kind_is_listed_once() {
         assert!(RepairName::ALL.iter().enumerate().all(|(place, name)| *name as usize == place));
-        assert_eq!(*RepairName::ALL.last().unwrap(), RepairName::Defeature);
+        assert_eq!(*RepairName::ALL.last().unwrap(), RepairName::Simplify);
     }
 
     #[test]

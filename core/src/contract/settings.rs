@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::contract::access::Access;
 use crate::contract::loop_class::LoopClass;
+use crate::contract::residue_settings::ResidueSettings;
 
 /// What a repair may do, and what its result must satisfy. Lengths written `…_relative` are fractions of the bounding box's
 /// diagonal; `…_mm` are in the file's units, which STL users take for millimetres.
@@ -118,6 +119,20 @@ pub struct Profile {
     pub remove_grooves_below_mm: f64,
     /// Bosses lower than this are removed, embossed letters among them. 0: none.
     pub remove_bosses_below_mm: f64,
+    /// Residue of a milling tool that is to be removed.
+    pub residue: ResidueSettings,
+    /// Waves shorter than this, in the file's units, are smoothed. 0: none.
+    pub smooth_waves_below_mm: f64,
+    /// Of the height of these waves, as much is left at most.
+    pub smooth_leaves: f64,
+    /// The result has so many triangles at most, if that is possible within the other bounds. 0: as many as it has.
+    pub simplify_triangles: u64,
+    /// The result has at most this share of the triangles. 0: as many as it has.
+    pub simplify_ratio: f64,
+    /// Triangles are made fewer where the surface, in the file's units, stays within this distance, both ways, proved. 0: no bound, and no reason to.
+    pub simplify_within_mm: f64,
+    /// Smoothing and simplifying keep edges where the surface turns by more degrees.
+    pub keep_edges_degrees: f64,
 }
 
 /// What to do with geometry that no repair can turn into a solid.
@@ -313,6 +328,13 @@ impl Default for Profile {
             remove_fillets_below_mm: 0.0,
             remove_grooves_below_mm: 0.0,
             remove_bosses_below_mm: 0.0,
+            residue: ResidueSettings::default(),
+            smooth_waves_below_mm: 0.0,
+            smooth_leaves: 0.1,
+            simplify_triangles: 0,
+            simplify_ratio: 0.0,
+            simplify_within_mm: 0.0,
+            keep_edges_degrees: 40.0,
         }
     }
 }

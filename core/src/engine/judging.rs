@@ -73,6 +73,9 @@ pub(crate) fn begin(task: Task, input: &Input<'_>, diagnosis: &Diagnosis<'_>, pr
         attributes: None,
         thin_walls: None,
         features: None,
+        residue: None,
+        smoothed: None,
+        simplified: None,
         stages: Vec::new(),
         cost: Cost::default(),
     }

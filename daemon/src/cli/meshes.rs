@@ -7,7 +7,7 @@ use clap::{ArgGroup, Args};
 use suture_core::OutputFormat;
 
 use super::spend::{Guarantee, Spend};
-use crate::units::{parse_format, parse_length};
+use crate::units::{parse_box, parse_format, parse_length, parse_share};
 
 /// The purpose of each profile.
 pub(super) const PROFILE_HELP: &str = "\
@@ -112,6 +112,60 @@ pub(crate) struct DefeatureArgs {
     /// Remove lower bosses, embossed letters among them
     #[arg(long, value_name = "H", value_parser = parse_length, group = "limits")]
     pub bosses_below: Option<f64>,
+    #[command(flatten)]
+    pub repair: RepairArgs,
+}
+
+#[derive(Args, Debug)]
+pub(crate) struct SimplifyArgs {
+    /// So many triangles at most
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..), group = "wanted")]
+    pub triangles: Option<u64>,
+    /// This share of the triangles at most
+    #[arg(long, value_name = "SHARE", value_parser = parse_share, group = "wanted")]
+    pub ratio: Option<f64>,
+    /// The surface stays within this distance, both ways, proved; alone, triangles are made as few as it allows; lengths are in the file's units
+    #[arg(long, value_name = "D", value_parser = parse_length)]
+    pub max_deviation: Option<f64>,
+    /// Keep edges where the surface turns by more degrees [default: 40]
+    #[arg(long, value_name = "DEGREES", value_parser = parse_length)]
+    pub keep_edges: Option<f64>,
+    #[command(flatten)]
+    pub repair: RepairArgs,
+}
+
+#[derive(Args, Debug)]
+pub(crate) struct SmoothArgs {
+    /// Smooth waves that are shorter than this; lengths are in the file's units
+    #[arg(long, value_name = "L", value_parser = parse_length)]
+    pub waves_below: Option<f64>,
+    /// Leave at most this share of their height [default: 0.1]
+    #[arg(long, value_name = "SHARE", value_parser = parse_share)]
+    pub leave: Option<f64>,
+    /// Keep edges where the surface turns by more degrees [default: 40]
+    #[arg(long, value_name = "DEGREES", value_parser = parse_length)]
+    pub keep_edges: Option<f64>,
+    #[command(flatten)]
+    pub repair: RepairArgs,
+}
+
+#[derive(Args, Debug)]
+pub(crate) struct ResidueArgs {
+    /// The tool path that cut the part: G-code, APT or CL data, or a project of CAMotics
+    #[arg(long, value_name = "PATH")]
+    pub toolpath: Option<PathBuf>,
+    /// A tool that the path does not describe, as 3=ball,d=6: its number, flat, ball, bull (r=), taper (a=, tip=) or drill, its diameter; several times
+    #[arg(long = "tool", value_name = "TOOL")]
+    pub tools: Vec<String>,
+    /// How far the mesh may be from what the tool cut, in millimetres: noise of the simulation [default: by the tool's size]
+    #[arg(long, value_name = "T", value_parser = parse_length)]
+    pub tolerance: Option<f64>,
+    /// A box whose triangles are residue's, by two corners; several times
+    #[arg(long, value_name = "X,Y,Z:X,Y,Z", value_parser = parse_box, allow_hyphen_values = true)]
+    pub include: Vec<[[f64; 3]; 2]>,
+    /// A box whose triangles are not; counts more
+    #[arg(long, value_name = "X,Y,Z:X,Y,Z", value_parser = parse_box, allow_hyphen_values = true)]
+    pub exclude: Vec<[[f64; 3]; 2]>,
     #[command(flatten)]
     pub repair: RepairArgs,
 }

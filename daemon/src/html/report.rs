@@ -8,6 +8,7 @@ use suture_core::{FIDELITY_RULES, RULES, Report};
 use super::page;
 use super::words::prose;
 use crate::say::plain;
+use crate::shaped;
 use crate::table;
 use crate::units::{show_box, show_count, show_number, show_point, show_seconds, show_size};
 
@@ -182,6 +183,7 @@ fn places(report: &Report) -> Markup {
     html! {
         (thin_walls(report))
         (features(report))
+        (shaping(report))
         @if !report.loops_left.is_empty() {
             h2 { "Left open" }
             table {
@@ -233,6 +235,16 @@ fn features(report: &Report) -> Markup {
                     td class="n" { (show_number(feature.confidence)) } td { @match &feature.left { Some(reason) => { "left: " (plain(reason)) }, None => "removed" } }
                 } } }
             }
+        }
+    }
+}
+
+fn shaping(report: &Report) -> Markup {
+    let lines = shaped::lines(report);
+    html! {
+        @if !lines.is_empty() {
+            h2 { "Shape" }
+            ul { @for (_, line) in &lines { li { (plain(line)) } } }
         }
     }
 }

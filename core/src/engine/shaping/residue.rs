@@ -1,0 +1,129 @@
+//! Residue of a tool, by the path that a profile names.
+
+use std::path::Path;
+
+use super::change::{Change, Told, replaced};
+use crate::contract::report::{MOST_LISTED, Residue, ResidueRegion};
+use crate::engine::mesh::Mesh;
+use crate::engine::work::Work;
+use crate::residue::{self, Corrections, Found, Kind, Repaired};
+use crate::simplify::{self, Input, Options};
+use crate::smooth;
+use crate::toolpath::{self, Program, Tool, project, tools};
+use crate::util::parallel;
+
+/// Regions keep this share of their triangles, where that keeps to the surface.
+const SHARE: f64 = 0.2;
+/// Of the lowest region's height, the simplified surface may be so far from the moved one.
+const OFF: f64 = 0.5;
+/// Oddities of a path that are listed.
+const FINDINGS: usize = 20;
+
+/// The mesh without residue, or why that cannot be.
+pub(super) fn find(mesh: &Mesh, work: Work<'_>) -> Result<Change, String> {
+    let settings = &work.profile.residue;
+    let program = program(Path::new(&settings.toolpath), &settings.tools)?;
+    let go_on = || !work.progress.cancelled();
+    let corrections = Corrections { include: &settings.include, exclude: &settings.exclude, ..Corrections::default() };
+    let options = residue::Options {
+        tolerance: (settings.tolerance_mm > 0.0).then_some(settings.tolerance_mm),
+        feature_degrees: work.profile.keep_edges_degrees,
+        corrections,
+        go_on: &go_on,
+        ..Default::default()
+    };
+    let view = residue::Mesh { points: mesh.vertices(), faces: mesh.faces() };
+    let look = || {
+        let found = residue::find(view, &program.moves, &program.header.tools, &options)?;
+        let repaired = residue::repair(view, &found, &options)?;
+        Ok::<_, residue::Error>((found, repaired))
+    };
+    let looked = parallel::in_pool(work.limits.threads, look);
+    let (found, repaired) = looked.map_err(|error| format!("{}: {error}", settings.toolpath))?;
+    let mut told = told(&found, &program);
+    if told.triangles_before == 0 {
+        return Ok(Change { gone: Vec::new(), added: Vec::new(), told: Told::Residue(told) });
+    }
+    let settled = parallel::in_pool(work.limits.threads, || smooth::settle(mesh.vertices(), mesh.faces(), &repaired.points));
+    let fewer = fewer(mesh, (&found, &repaired), &settled.points, work)?;
+    let (gone, added) = replaced(mesh, (&fewer.points, &fewer.faces, &fewer.origins));
+    told.moved = mesh.vertices().iter().zip(&settled.points).filter(|(from, to)| from != to).count() as u64;
+    told.displacement = settled.largest;
+    told.volume_change = repaired.volume;
+    let proved = fewer.proved.unwrap_or_default();
+    told.deviation = proved.forward.max(proved.backward);
+    told.triangles_after = (fewer.faces.len() as u64 + told.triangles_before).saturating_sub(mesh.faces().len() as u64);
+    Ok(Change { gone, added, told: Told::Residue(told) })
+}
+
+/// The path and its tools: tools of the profile count more than those of the path; a project of CAMotics names both.
+fn program(path: &Path, listed: &[String]) -> Result<Program, String> {
+    let shown = path.display();
+    let read = |path: &Path| std::fs::read(path).map_err(|error| format!("{}: cannot be read: {error}", path.display()));
+    let tools: Result<Vec<Tool>, _> = listed.iter().map(|text| tools::parse(text)).collect();
+    let mut options = toolpath::Options { tools: tools.map_err(|error| error.to_string())?, ..Default::default() };
+    let bytes = read(path)?;
+    match toolpath::read(&bytes, &options) {
+        Err(toolpath::ReadError::Project) => {
+            let project = project::read(&bytes).map_err(|error| format!("{shown}: {error}"))?;
+            let [file] = project.files.as_slice() else {
+                return Err(format!("{shown}: a project of {} tool paths; name one of them", project.files.len()));
+            };
+            let known: Vec<u32> = options.tools.iter().map(|tool| tool.number).collect();
+            options.tools.extend(project.tools.into_iter().filter(|tool| !known.contains(&tool.number)));
+            let beside = path.parent().unwrap_or(Path::new("")).join(file);
+            toolpath::read(&read(&beside)?, &options).map_err(|error| format!("{}: {error}", beside.display()))
+        }
+        other => other.map_err(|error| format!("{shown}: {error}")),
+    }
+}
+
+/// The moved mesh with fewer triangles in its regions.
+fn fewer(
+    mesh: &Mesh,
+    (found, repaired): (&Found, &Repaired),
+    places: &[[f32; 3]],
+    work: Work<'_>,
+) -> Result<simplify::Outcome, String> {
+    let region: Vec<bool> = found.labels.iter().map(|label| *label != u32::MAX).collect();
+    let inside = region.iter().filter(|is_in| **is_in).count();
+    let height = found.regions.iter().map(|region| region.height).fold(f64::INFINITY, f64::min);
+    let options = Options {
+        triangles: Some(mesh.faces().len() - inside + (inside as f64 * SHARE) as usize),
+        max_deviation: height.is_finite().then_some(OFF * height),
+        feature_angle: Some(work.profile.keep_edges_degrees.to_radians()),
+        ..Options::default()
+    };
+    let input = Input { points: places, faces: mesh.faces(), region: Some(&region), fixed: Some(&repaired.is_fixed) };
+    let outcome = parallel::in_pool(work.limits.threads, || simplify::simplify(&input, &options));
+    let mut outcome = outcome.map_err(|error| error.to_string())?;
+    // A triangle that only moved is a new one, too.
+    let is_moved = |vertex: &u32| mesh.vertices().get(*vertex as usize) != places.get(*vertex as usize);
+    for origin in &mut outcome.origins {
+        if mesh.faces().get(*origin as usize).is_some_and(|face| face.iter().any(is_moved)) {
+            *origin = u32::MAX;
+        }
+    }
+    Ok(outcome)
+}
+
+fn told(found: &Found, program: &Program) -> Residue {
+    let region = |region: &residue::RegionReport| ResidueRegion {
+        kind: match region.kind {
+            Kind::Stairs => "stairs".into(),
+            Kind::Ripples => "ripples".into(),
+        },
+        confidence: region.confidence,
+        height: region.height,
+        pitch: region.pitch,
+        area: region.area,
+        triangles: region.triangles as u64,
+    };
+    let findings = program.header.findings.iter().take(FINDINGS);
+    Residue {
+        regions: found.regions.iter().take(MOST_LISTED).map(region).collect(),
+        triangles_before: found.labels.iter().filter(|label| **label != u32::MAX).count() as u64,
+        findings: findings.map(|finding| format!("line {}: {}", finding.line, finding.text)).collect(),
+        ..Residue::default()
+    }
+}

@@ -1,0 +1,45 @@
+//! Fewer triangles, as a profile asks for them.
+
+use super::change::{Change, Told, replaced};
+use crate::contract::report::Simplified;
+use crate::contract::settings::Profile;
+use crate::engine::mesh::Mesh;
+use crate::engine::work::Work;
+use crate::simplify::{self, Input, Options};
+use crate::util::parallel;
+
+/// How many triangles a profile wants of so many.
+fn wanted(profile: &Profile, triangles: usize) -> Option<usize> {
+    let count = (profile.simplify_triangles > 0).then(|| usize::try_from(profile.simplify_triangles).unwrap_or(usize::MAX));
+    let share = (profile.simplify_ratio > 0.0).then_some((triangles as f64 * profile.simplify_ratio) as usize);
+    count.into_iter().chain(share).min()
+}
+
+/// The mesh with fewer triangles, or why that cannot be.
+pub(super) fn simplify(mesh: &Mesh, work: Work<'_>) -> Result<Change, String> {
+    let profile = work.profile;
+    let wanted = wanted(profile, mesh.faces().len());
+    let within = (profile.simplify_within_mm > 0.0).then_some(profile.simplify_within_mm);
+    let options = Options {
+        triangles: wanted,
+        max_deviation: within,
+        feature_angle: Some(profile.keep_edges_degrees.to_radians()),
+        ..Options::default()
+    };
+    let input = Input { points: mesh.vertices(), faces: mesh.faces(), region: None, fixed: None };
+    let outcome = parallel::in_pool(work.limits.threads, || simplify::simplify(&input, &options));
+    let outcome = outcome.map_err(|error| error.to_string())?;
+    let proved = outcome.proved.unwrap_or_default();
+    let short = wanted.filter(|wanted| outcome.faces.len() > *wanted).map(|wanted| {
+        format!("{wanted} triangles were asked for; with fewer than now, triangles would cross or turn over, an edge of the part would go, or the surface would be too far off")
+    });
+    let told = Simplified {
+        before: mesh.faces().len() as u64,
+        after: outcome.faces.len() as u64,
+        to_result: proved.forward,
+        from_result: proved.backward,
+        why_not: short,
+    };
+    let (gone, added) = replaced(mesh, (&outcome.points, &outcome.faces, &outcome.origins));
+    Ok(Change { gone, added, told: Told::Simplified(told) })
+}

@@ -1,0 +1,349 @@
+//! A proved bound of the distance between two surfaces, both ways, by a map from one onto the other.
+//!
+//! **In:** two meshes, and for each vertex of the first the vertex of the second that it has become.
+//! **Out:** bounds of the distance both ways, and the triangles that are farther than a bound.
+//! **Promise:** no place of either surface is farther from the other than its bound, whatever the vertices have become. The same result for any number of threads.
+//!
+//! Each vertex of the first surface goes to a near spot of the second, each edge to a polyline from face to face, each triangle is cut into polygons whose
+//! images lie in one face each. The map is linear on each of them (fans of triangles), so that it moves no place farther than the farthest corner: that bounds the
+//! distance from the first surface to the second. It is continuous, so the degree with which it covers a face is one whole number for all of the
+//! inside, if no rim of what is mapped runs there; the signed areas of the images sum up to it (Cohen, Manocha & Olano, "Successive mappings", IJCGA
+//! 13(1), 2003, for maps between meshes; Outerelo & Ruiz, "Mapping degree theory", 2009, for the degree). Where it is not zero, each place of the face is
+//! an image, and so not farther from the first surface.
+//!
+//! Triangles whose image is not found, and faces without such a degree, are bounded by [`search`]: a triangle is as near to another one as the
+//! farthest of its corners, as the distance from a convex set is a convex function; else it is halved.
+
+mod chain;
+mod fill;
+mod pairing;
+mod search;
+mod surface;
+#[cfg(test)]
+mod tests;
+
+use std::sync::atomic::{AtomicI64, Ordering};
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use crate::geometry::distance::place;
+use crate::proof::chain::{Lent, Pair};
+use crate::proof::fill::Piece;
+pub(crate) use crate::proof::pairing::Pairing;
+use crate::proof::surface::{Spot, Surface};
+use crate::util::ids::NONE;
+
+/// The unit of sums of areas, as a share of a face: whole numbers, whose sum does not depend on their order.
+const UNIT: f64 = (1_u64 << 40) as f64;
+
+/// What rounding adds to a distance, as a share of the largest coordinate: a hundred times the error of the few sums of f64 that it is made of.
+const ROUNDING: f64 = 1e-13;
+
+/// A bound may be larger than the distance of the farthest vertex by this share before it is worth a search.
+const SLACK: f64 = 1.02;
+
+/// Steps from face to face towards the nearest one, at most.
+const WALK: usize = 24;
+
+/// Each so many distances stand for all, and one of so many of these vertices is looked at again, so many rings of faces wide.
+const SAMPLE: usize = 8;
+const FARTHEST: usize = 500;
+const RINGS: usize = 3;
+
+/// Triangles that a thread takes at once.
+const BLOCK: usize = 1 << 12;
+
+/// Bounds of distances, in the unit of the points.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Proved {
+    /// No place of the first surface is farther from the second.
+    pub forward: f64,
+    /// No place of the second surface is farther from the first.
+    pub backward: f64,
+    /// Triangles and faces that needed a search.
+    pub searched: usize,
+}
+
+/// What is known of a block of triangles.
+#[derive(Default)]
+struct Found {
+    farthest: f64,
+    failed: Vec<u32>,
+    /// Faces in which the rim of failed triangles runs, or what is too far goes.
+    rims: Vec<u32>,
+}
+
+/// Proves bounds, and names the triangles of the first mesh that are, or may be, farther than `most`, or near to what is. O(n) where the meshes are alike.
+pub(crate) fn prove(pairing: &Pairing<'_>, most: f64) -> (Proved, Vec<u32>) {
+    let surface = Surface::new(pairing.new_points, pairing.new_faces);
+    let images: Vec<Option<(Spot, f64)>> =
+        (0..pairing.points.len()).into_par_iter().with_min_len(BLOCK).map(|v| image(&surface, pairing, v)).collect();
+    let images = with_better_ones(&surface, pairing, images);
+    let covered: Vec<AtomicI64> = (0..pairing.new_faces.len()).map(|_| AtomicI64::new(0)).collect();
+    let size = pairing.points.iter().chain(pairing.new_points).flatten().fold(0.0_f32, |m, x| m.max(x.abs()));
+    // As vertices are about so far, no bound can be much better; where a bound is wanted, no better one is needed.
+    let farthest_vertex = images.par_iter().flatten().map(|image| image.1).reduce(|| 0.0, f64::max);
+    let tight = (farthest_vertex * SLACK).max(f64::from(size) * ROUNDING);
+    let aim = if most.is_finite() { most } else { tight };
+    let map = Map { surface: &surface, pairing, images: &images, covered: &covered, aim };
+    let blocks = pairing.faces.len().div_ceil(BLOCK);
+    let found: Vec<Found> = (0..blocks).into_par_iter().with_max_len(1).map(|block| map.block(block)).collect();
+    let farthest = found.iter().map(|f| f.farthest).fold(0.0, f64::max);
+    let failed: Vec<u32> = found.iter().flat_map(|f| f.failed.iter().copied()).collect();
+    let mut is_sure: Vec<bool> = covered.par_iter().map(|sum| covers(sum.load(Ordering::Relaxed))).collect();
+    found.iter().flat_map(|f| &f.rims).for_each(|face| is_sure[*face as usize] = false);
+    let bare: Vec<u32> = (0..is_sure.len() as u32).filter(|f| !is_sure[*f as usize]).collect();
+    let (forward, mut far) = search::forward(&surface, pairing, &images, &failed, (aim, most));
+    let (backward, under) = search::backward(&surface, pairing, &images, &bare, (aim, most));
+    far.extend(under);
+    far.sort_unstable();
+    far.dedup();
+    let sure = |d: f64| if d > 0.0 { d * (1.0 + 1e-9) + f64::from(size) * ROUNDING } else { 0.0 };
+    let proved = Proved {
+        forward: sure(farthest.max(forward)),
+        backward: sure(farthest.max(backward)),
+        searched: failed.len() + bare.len(),
+    };
+    (proved, far)
+}
+
+/// Is a sum of areas a degree that is not zero?
+fn covers(sum: i64) -> bool {
+    let degree = sum as f64 / UNIT;
+    degree.round() != 0.0 && (degree - degree.round()).abs() < 0.01
+}
+
+/// The spot for a vertex: itself if it is still there, else the nearest one of those around what it became, and from there on.
+fn image(surface: &Surface<'_>, pairing: &Pairing<'_>, v: usize) -> Option<(Spot, f64)> {
+    let became = *pairing.became.get(v)?;
+    if became == NONE {
+        return None;
+    }
+    if pairing.points[v] == pairing.new_points[became as usize] {
+        return Some((surface.at_vertex(became)?, 0.0));
+    }
+    let p = place(pairing.points[v]);
+    let mut best: Option<(Spot, f64)> = None;
+    for face in surface.around(became) {
+        let other = surface.nearest(*face, p);
+        if best.is_none_or(|best| other.1 < best.1) {
+            best = Some(other);
+        }
+    }
+    Some(walk(surface, p, best?)).map(|(spot, square)| (spot, square.sqrt()))
+}
+
+/// Looks wider for the farthest vertices: a walk may have ended where all around is farther, and not what is behind it.
+fn with_better_ones(
+    surface: &Surface<'_>,
+    pairing: &Pairing<'_>,
+    mut images: Vec<Option<(Spot, f64)>>,
+) -> Vec<Option<(Spot, f64)>> {
+    let mut distances: Vec<f64> = images.iter().flatten().step_by(SAMPLE).map(|image| image.1).collect();
+    let rank = distances.len() - distances.len() / FARTHEST;
+    if rank >= distances.len() {
+        return images;
+    }
+    let bound = *distances.select_nth_unstable_by(rank, f64::total_cmp).1;
+    images.par_iter_mut().enumerate().with_min_len(BLOCK).for_each(|(v, image)| {
+        let Some((spot, distance)) = image else { return };
+        if *distance <= bound {
+            return;
+        }
+        let p = place(pairing.points[v]);
+        let mut faces = vec![spot.face];
+        for _ in 0..RINGS {
+            faces =
+                faces.iter().flat_map(|f| surface.faces[*f as usize]).flat_map(|v| surface.around(v).iter().copied()).collect();
+            faces.sort_unstable();
+            faces.dedup();
+        }
+        for face in faces {
+            let other = surface.nearest(face, p);
+            if other.1.sqrt() < *distance {
+                (*spot, *distance) = (other.0, other.1.sqrt());
+            }
+        }
+        let (better, square) = walk(surface, p, (*spot, distance.powi(2)));
+        if square.sqrt() < *distance {
+            (*spot, *distance) = (better, square.sqrt());
+        }
+    });
+    images
+}
+
+/// Goes from a spot to nearer ones while there are any around; with squares of distances.
+fn walk(surface: &Surface<'_>, p: DVec3, mut best: (Spot, f64)) -> (Spot, f64) {
+    for _ in 0..WALK {
+        if best.0.shares.iter().all(|s| *s > 0.0) {
+            break;
+        }
+        let mut next = best;
+        let mut look = |face: u32| {
+            let other = surface.nearest(face, p);
+            if other.1 < next.1 {
+                next = other;
+            }
+        };
+        if let Some(k) = best.0.shares.iter().position(|s| *s == 1.0) {
+            surface.around(surface.faces[best.0.face as usize][k]).iter().for_each(|face| look(*face));
+        } else {
+            (0..3).filter(|k| best.0.shares[(k + 2) % 3] == 0.0).filter_map(|k| surface.beyond(best.0.face, k)).for_each(look);
+        }
+        if next.0 == best.0 {
+            break;
+        }
+        best = next;
+    }
+    best
+}
+
+/// All that a triangle is mapped by.
+struct Map<'m> {
+    surface: &'m Surface<'m>,
+    pairing: &'m Pairing<'m>,
+    images: &'m [Option<(Spot, f64)>],
+    covered: &'m [AtomicI64],
+    aim: f64,
+}
+
+/// Lists lent to many triangles.
+#[derive(Default)]
+struct Scratch {
+    chain: Lent,
+    rim: Vec<Pair>,
+    piece: Vec<Pair>,
+    /// Polygons: their faces, and the ends of their spots in the list.
+    pieces: Vec<(u32, usize)>,
+    spots: Vec<Spot>,
+}
+
+impl Map<'_> {
+    /// Maps a block of triangles.
+    fn block(&self, block: usize) -> Found {
+        let (mut found, mut lent) = (Found::default(), Scratch::default());
+        for f in block * BLOCK..self.pairing.faces.len().min((block + 1) * BLOCK) {
+            let face = self.pairing.faces[f];
+            let [Some(a), Some(b), Some(c)] = face.map(|v| self.images[v as usize]) else {
+                found.failed.push(f as u32);
+                continue;
+            };
+            let farthest = a.1.max(b.1).max(c.1);
+            if let Some(common) = self.surface.common(&[a.0, b.0, c.0]) {
+                add(self.surface, self.covered, common, &[a.0, b.0, c.0]);
+                if farthest > self.aim {
+                    found.failed.push(f as u32);
+                    found.rims.push(common);
+                } else {
+                    found.farthest = found.farthest.max(farthest);
+                }
+            } else {
+                self.across(f as u32, (face, [a, b, c]), &mut lent, &mut found);
+            }
+        }
+        found
+    }
+
+    /// Maps a triangle that does not go into one face.
+    fn across(&self, f: u32, of: ([u32; 3], [(Spot, f64); 3]), lent: &mut Scratch, found: &mut Found) {
+        let Scratch { pieces, spots, .. } = lent;
+        pieces.clear();
+        spots.clear();
+        let farthest = map_across(self.surface, self.pairing, of, self.aim, lent);
+        if farthest.is_none() {
+            found.failed.push(f);
+            rims(self.surface, self.pairing, of, self.aim, &mut lent.chain, &mut found.rims);
+            return;
+        }
+        let mut start = 0;
+        for (face, end) in &lent.pieces {
+            add(self.surface, self.covered, *face, &lent.spots[start..*end]);
+            start = *end;
+        }
+        match farthest.filter(|d| *d <= self.aim) {
+            Some(d) => found.farthest = found.farthest.max(d),
+            None => {
+                // It covers what it covers, but from too far.
+                found.failed.push(f);
+                found.rims.extend(lent.pieces.iter().map(|piece| piece.0));
+            }
+        }
+    }
+}
+
+/// Adds the signed area of a polygon in a face, as a share of that of the face.
+fn add(surface: &Surface<'_>, covered: &[AtomicI64], face: u32, spots: &[Spot]) {
+    let mut sum = 0.0;
+    let (mut first, mut last): (Option<[f64; 3]>, Option<[f64; 3]>) = (None, None);
+    for shares in spots.iter().filter_map(|spot| surface.within(spot, face)) {
+        if let Some(before) = last {
+            sum += before[1] * shares[2] - before[2] * shares[1];
+        } else {
+            first = Some(shares);
+        }
+        last = Some(shares);
+    }
+    if let (Some(first), Some(last)) = (first, last) {
+        sum += last[1] * first[2] - last[2] * first[1];
+    }
+    covered[face as usize].fetch_add((sum * UNIT) as i64, Ordering::Relaxed);
+}
+
+/// The ends of the sides of a triangle, with the smaller vertex first, and whether that turns them round.
+fn sides(pairing: &Pairing<'_>, face: [u32; 3], spots: [(Spot, f64); 3]) -> [(Pair, Pair, bool); 3] {
+    let pair = |k: usize| Pair { place: place(pairing.points[face[k % 3] as usize]), spot: spots[k % 3].0, off: spots[k % 3].1 };
+    [0, 1, 2].map(|k| {
+        let turned = face[k] > face[(k + 1) % 3];
+        if turned { (pair(k + 1), pair(k), true) } else { (pair(k), pair(k + 1), false) }
+    })
+}
+
+/// Cuts a triangle that does not go into one face into pieces, in `lent`; returns how far its farthest corner or cut goes, if it can be mapped.
+fn map_across(
+    surface: &Surface<'_>,
+    pairing: &Pairing<'_>,
+    (face, spots): ([u32; 3], [(Spot, f64); 3]),
+    aim: f64,
+    lent: &mut Scratch,
+) -> Option<f64> {
+    let Scratch { chain, rim, piece, pieces, spots: all } = lent;
+    rim.clear();
+    for (from, to, turned) in sides(pairing, face, spots) {
+        rim.push(if turned { to } else { from });
+        let start = rim.len();
+        if !chain::between(surface, [&from, &to], aim, chain, rim) {
+            return None;
+        }
+        if turned {
+            rim[start..].reverse();
+        }
+    }
+    let triangle = face.map(|v| place(pairing.points[v as usize]));
+    let mut farthest = 0.0_f64;
+    let is_mapped = fill::fill(surface, &triangle, rim, piece, &mut |part: Piece<'_>| {
+        all.extend(part.corners.iter().map(|pair| pair.spot));
+        farthest = part.corners.iter().map(|pair| pair.off).fold(farthest, f64::max);
+        pieces.push((part.face, all.len()));
+    });
+    is_mapped.then_some(farthest)
+}
+
+/// The faces in which the sides of a triangle run.
+fn rims(
+    surface: &Surface<'_>,
+    pairing: &Pairing<'_>,
+    (face, spots): ([u32; 3], [(Spot, f64); 3]),
+    aim: f64,
+    lent: &mut Lent,
+    out: &mut Vec<u32>,
+) {
+    for (from, to, _) in sides(pairing, face, spots) {
+        let mut chain = vec![from];
+        // Where there is no way, the triangle beyond fails as well, and no rim runs there.
+        if chain::between(surface, [&from, &to], aim, lent, &mut chain) {
+            chain.push(to);
+            out.extend(chain.windows(2).filter_map(|two| surface.common(&[two[0].spot, two[1].spot])));
+        }
+    }
+}

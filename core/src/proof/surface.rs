@@ -1,0 +1,148 @@
+//! A surface to be mapped to: its faces around vertices, and places on it that are known by vertices, so that what is common to faces is exactly common.
+
+use glam::DVec3;
+
+use crate::geometry::distance::{place, share_along};
+use crate::geometry::exact::Point;
+
+/// A mesh with its faces by vertices.
+pub(super) struct Surface<'a> {
+    pub(super) points: &'a [Point],
+    pub(super) faces: &'a [[u32; 3]],
+    starts: Vec<u32>,
+    around: Vec<u32>,
+}
+
+/// A place on a face: shares of its corners, none negative; those that are zero are exactly so.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Spot {
+    pub(super) face: u32,
+    pub(super) shares: [f64; 3],
+}
+
+impl<'a> Surface<'a> {
+    /// O(n).
+    pub(super) fn new(points: &'a [Point], faces: &'a [[u32; 3]]) -> Self {
+        let mut starts = vec![0_u32; points.len() + 1];
+        faces.as_flattened().iter().for_each(|v| starts[*v as usize] += 1);
+        let mut sum = 0;
+        for start in &mut starts {
+            sum += *start;
+            *start = sum;
+        }
+        let mut around = vec![0_u32; 3 * faces.len()];
+        for (f, face) in faces.iter().enumerate().rev() {
+            for v in face {
+                let at = &mut starts[*v as usize];
+                *at -= 1;
+                around[*at as usize] = f as u32;
+            }
+        }
+        Self { points, faces, starts, around }
+    }
+
+    /// The faces around a vertex, by number.
+    #[inline]
+    pub(super) fn around(&self, v: u32) -> &[u32] {
+        let range = self.starts[v as usize] as usize..self.starts[v as usize + 1] as usize;
+        &self.around[range]
+    }
+
+    #[inline]
+    pub(super) fn corners(&self, face: u32) -> [DVec3; 3] {
+        self.faces[face as usize].map(|v| place(self.points[v as usize]))
+    }
+
+    #[inline]
+    pub(super) fn position(&self, spot: &Spot) -> DVec3 {
+        let [a, b, c] = self.corners(spot.face);
+        a * spot.shares[0] + b * spot.shares[1] + c * spot.shares[2]
+    }
+
+    /// The spot at a vertex.
+    pub(super) fn at_vertex(&self, v: u32) -> Option<Spot> {
+        let face = *self.around(v).first()?;
+        let shares = self.faces[face as usize].map(|w| if w == v { 1.0 } else { 0.0 });
+        Some(Spot { face, shares })
+    }
+
+    /// The same spot as one of another face, if it lies in it.
+    #[inline]
+    pub(super) fn within(&self, spot: &Spot, face: u32) -> Option<[f64; 3]> {
+        if spot.face == face {
+            return Some(spot.shares);
+        }
+        if spot.shares.iter().all(|s| *s > 0.0) {
+            return None;
+        }
+        let (from, to) = (self.faces[spot.face as usize], self.faces[face as usize]);
+        let mut shares = [0.0; 3];
+        for (v, share) in from.iter().zip(spot.shares) {
+            if share > 0.0 {
+                shares[to.iter().position(|w| w == v)?] = share;
+            }
+        }
+        Some(shares)
+    }
+
+    /// A face in which all these spots lie.
+    #[inline]
+    pub(super) fn common(&self, spots: &[Spot]) -> Option<u32> {
+        let first = spots.first()?;
+        let holds = |face: u32| spots.iter().all(|spot| self.within(spot, face).is_some());
+        if spots.iter().all(|spot| spot.face == first.face) || holds(first.face) {
+            return Some(first.face);
+        }
+        // Where one lies inside a face, there is no other one; else all are around a vertex of the first.
+        if let Some(inner) = spots.iter().find(|spot| spot.shares.iter().all(|s| *s > 0.0)) {
+            return holds(inner.face).then_some(inner.face);
+        }
+        let k = first.shares.iter().position(|s| *s > 0.0)?;
+        self.around(self.faces[first.face as usize][k]).iter().copied().find(|face| holds(*face))
+    }
+
+    /// The faces in which a spot lies.
+    pub(super) fn faces_of(&self, spot: &Spot, found: &mut Vec<u32>) {
+        found.clear();
+        match spot.shares.iter().position(|s| *s > 0.0) {
+            Some(k) if spot.shares.contains(&0.0) => {
+                let all = self.around(self.faces[spot.face as usize][k]);
+                found.extend(all.iter().copied().filter(|face| self.within(spot, *face).is_some()));
+            }
+            _ => found.push(spot.face),
+        }
+    }
+
+    /// The face beyond the edge from corner `k` of a face on, if there is one, and only one.
+    pub(super) fn beyond(&self, face: u32, k: usize) -> Option<u32> {
+        let [p, q] = [self.faces[face as usize][k], self.faces[face as usize][(k + 1) % 3]];
+        let mut others = self.around(p).iter().copied().filter(|f| *f != face && self.faces[*f as usize].contains(&q));
+        let one = others.next()?;
+        others.next().is_none().then_some(one)
+    }
+
+    /// The spot of a face that is nearest to a place, and the square of its distance.
+    #[inline]
+    pub(super) fn nearest(&self, face: u32, p: DVec3) -> (Spot, f64) {
+        let [a, b, c] = self.corners(face);
+        let normal = (b - a).cross(c - a);
+        let square = normal.length_squared();
+        let inner = [(b, c), (c, a), (a, b)].map(|(u, v)| (v - u).cross(p - u).dot(normal));
+        if square > 0.0 && inner.iter().all(|x| *x > 0.0) {
+            let sum = inner[0] + inner[1] + inner[2];
+            let height = normal.dot(p - a);
+            return (Spot { face, shares: inner.map(|x| x / sum) }, height * height / square);
+        }
+        let mut best = (Spot { face, shares: [1.0, 0.0, 0.0] }, f64::INFINITY);
+        for (k, (u, v)) in [(a, b), (b, c), (c, a)].into_iter().enumerate() {
+            let t = share_along(p, u, v);
+            let distance = (p - u - (v - u) * t).length_squared();
+            if distance < best.1 {
+                let mut shares = [0.0; 3];
+                (shares[k], shares[(k + 1) % 3]) = (1.0 - t, t);
+                best = (Spot { face, shares }, distance);
+            }
+        }
+        best
+    }
+}

@@ -1,0 +1,90 @@
+use crate::geometry::exact::Point;
+use proptest::prelude::*;
+
+use super::*;
+use crate::geometry::distance::square_distance;
+
+/// A grid of n × n squares with a height at each vertex.
+fn grid(n: u32, height: impl Fn(u32) -> f32) -> (Vec<Point>, Vec<[u32; 3]>) {
+    let m = n + 1;
+    let points = (0..m * m).map(|i| [(i % m) as f32, (i / m) as f32, height(i)]).collect();
+    let squares = (0..m * m).filter(|i| i % m < n && i / m < n);
+    (points, squares.flat_map(|a| [[a, a + 1, a + m + 1], [a, a + m + 1, a + m]]).collect())
+}
+
+/// The largest distance of sampled places of one mesh from another.
+fn sampled(points: &[Point], faces: &[[u32; 3]], to: (&[Point], &[[u32; 3]])) -> f64 {
+    const STEPS: u32 = 6;
+    let corners = |points: &[Point], f: &[u32; 3]| f.map(|v| place(points[v as usize]));
+    let others: Vec<_> = to.1.iter().map(|f| corners(to.0, f)).collect();
+    let shares = || (0..=STEPS).flat_map(|i| (0..=STEPS - i).map(move |j| (f64::from(i) / 6.0, f64::from(j) / 6.0)));
+    let places = faces.iter().flat_map(|f| {
+        let [a, b, c] = corners(points, f);
+        shares().map(move |(u, v)| a + (b - a) * u + (c - a) * v)
+    });
+    places.map(|p| others.iter().map(|t| square_distance(p, *t)).fold(f64::INFINITY, f64::min)).fold(0.0, f64::max).sqrt()
+}
+
+#[test]
+fn a_mesh_is_at_no_distance_from_itself() {
+    let (points, faces) = grid(4, |i| (i % 3) as f32);
+    let became: Vec<u32> = (0..points.len() as u32).collect();
+    let pairing = Pairing { points: &points, faces: &faces, new_points: &points, new_faces: &faces, became: &became };
+    assert_eq!(prove(&pairing, f64::INFINITY), (Proved::default(), Vec::new()));
+}
+
+/// A square pyramid of height 1, and its base: the tip is at distance 1, and so is the middle of the base, or nearer to the sides.
+#[test]
+fn a_tent_is_as_far_from_the_ground_as_it_is_high() {
+    let points = [[-9.0, -9.0, 0.0], [9.0, -9.0, 0.0], [9.0, 9.0, 0.0], [-9.0, 9.0, 0.0], [0.0, 0.0, 1.0]];
+    let faces = [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]];
+    let ground = [[0, 1, 2], [0, 2, 3]];
+    let became = [0, 1, 2, 3, 0];
+    let pairing = Pairing { points: &points, faces: &faces, new_points: &points[..4], new_faces: &ground, became: &became };
+    let (proved, _) = prove(&pairing, f64::INFINITY);
+    assert!((proved.forward - 1.0).abs() < 1e-6, "{proved:?}");
+    // 9∕√82 from the middle to a side.
+    assert!(proved.backward >= 9.0 / 82.0_f64.sqrt() && proved.backward <= 1.0 + 1e-6, "{proved:?}");
+}
+
+/// Half of the second mesh is missing in the first: only the way back is long.
+#[test]
+fn what_is_not_covered_is_found() {
+    let (points, faces) = grid(4, |_| 0.0);
+    let became: Vec<u32> = (0..points.len() as u32).collect();
+    let some: Vec<[u32; 3]> = faces.iter().copied().filter(|f| f.iter().all(|v| v % 5 < 3)).collect();
+    let pairing = Pairing { points: &points, faces: &some, new_points: &points, new_faces: &faces, became: &became };
+    let (proved, _) = prove(&pairing, f64::INFINITY);
+    assert_eq!(proved.forward, 0.0);
+    assert!((2.0..2.01).contains(&proved.backward), "{proved:?}");
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(100))]
+    /// Whatever the vertices are said to have become, no sampled place is farther than the bound.
+    #[test]
+    fn no_place_is_farther_than_the_bound(
+        heights in prop::collection::vec(0u8..8, 25),
+        others in prop::collection::vec(0u8..8, 9),
+        became in prop::collection::vec(0u32..9, 25),
+        missing in prop::option::of(0usize..8),
+        random in any::<bool>(),
+    ) {
+        let (points, faces) = grid(4, |i| f32::from(heights[i as usize]) / 4.0);
+        let (coarse, mut new_faces) = grid(2, |i| f32::from(others[i as usize]) / 4.0);
+        let new_points: Vec<Point> = coarse.iter().map(|p| [2.0 * p[0], 2.0 * p[1], p[2]]).collect();
+        if let Some(missing) = missing {
+            new_faces.remove(missing);
+        }
+        let near = |i: u32| (i % 5).div_ceil(2) + (i / 5).div_ceil(2) * 3;
+        let became: Vec<u32> = (0..25).map(|i| if random { became[i as usize] } else { near(i) }).collect();
+        let pairing = Pairing { points: &points, faces: &faces, new_points: &new_points, new_faces: &new_faces, became: &became };
+        let (proved, far) = prove(&pairing, f64::INFINITY);
+        let there = sampled(&points, &faces, (&new_points, &new_faces));
+        let back = sampled(&new_points, &new_faces, (&points, &faces));
+        prop_assert!(there <= proved.forward && back <= proved.backward, "{} {} {:?}", there, back, proved);
+        prop_assert!(far.is_empty());
+        let (_, far) = prove(&pairing, 0.5 * there);
+        prop_assert!(there == 0.0 || !far.is_empty());
+    }
+}

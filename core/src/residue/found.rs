@@ -1,0 +1,53 @@
+//! A mesh, and the residue that is found on it.
+
+/// A mesh that is looked at: places of vertices in millimetres, and triangles by numbers of vertices.
+#[derive(Clone, Copy, Debug)]
+pub struct Mesh<'a> {
+    /// Places of vertices.
+    pub points: &'a [[f32; 3]],
+    /// Triangles, counter-clockwise seen from outside.
+    pub faces: &'a [[u32; 3]],
+}
+
+impl Mesh<'_> {
+    pub(super) fn corners(&self, face: &[u32; 3]) -> [[f64; 3]; 3] {
+        face.map(|vertex| self.points.get(vertex as usize).map_or([0.0; 3], |point| point.map(f64::from)))
+    }
+}
+
+/// The form of residue.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// Passes follow each other along the tool's axis: steps of a wall.
+    Stairs,
+    /// Passes lie beside each other: waves of a floor.
+    Ripples,
+}
+
+/// A region of residue.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RegionReport {
+    /// Its form.
+    pub kind: Kind,
+    /// The part of its area that speaks for that form, between 0 and 1.
+    pub confidence: f64,
+    /// Height above the intended surface that 98 % of its vertices do not exceed, in millimetres.
+    pub height: f64,
+    /// Median of the distance of neighbouring passes, in millimetres.
+    pub pitch: f64,
+    /// In square millimetres.
+    pub area: f64,
+    /// How many triangles it has.
+    pub triangles: usize,
+}
+
+/// Residue that was found.
+#[derive(Clone, Debug)]
+pub struct Found {
+    /// For each triangle the number of its region; `u32::MAX` of one that is no residue's.
+    pub labels: Vec<u32>,
+    /// For each vertex its place on the intended surface; not a number where none is known.
+    pub targets: Vec<[f32; 3]>,
+    /// Regions, in the order of their first triangles.
+    pub regions: Vec<RegionReport>,
+}

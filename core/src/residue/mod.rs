@@ -1,0 +1,30 @@
+//! Tool residue: what a milling tool left between its passes is found from the tool path, and the surface that was meant is given back.
+//!
+//! **In:** a mesh of a simulated workpiece, the moves of the tool, the tools.
+//! **Out:** [`find`]: regions of residue, for each triangle its region, for each vertex its place on the intended surface; [`repair`]: the
+//! mesh with those regions moved there; [`hint`]: waves of a patch without a path, for a person to look at.
+//!
+//! The swept volume is the least signed distance from the tool over all cutting moves (`cuts`, `tree`, `sweep`, `profile`); `intended` has
+//! the surface between passes, `find` and `regions` the triangles, `repair` the move.
+//! **Promise:** borders of regions and all outside them stay as they are, to the bit; the same result for any number of threads.
+
+mod cuts;
+mod find;
+mod found;
+mod intended;
+mod options;
+mod profile;
+mod regions;
+mod repair;
+mod spectrum;
+mod sweep;
+mod tree;
+
+#[cfg(test)]
+mod tests;
+
+pub use find::find;
+pub use found::{Found, Kind, Mesh, RegionReport};
+pub use options::{Corrections, Error, Options, Region};
+pub use repair::{Repaired, repair};
+pub use spectrum::{Hint, hint};

@@ -1,0 +1,212 @@
+//! The collapses within one cell, cheapest first.
+
+use glam::DVec3;
+
+use crate::geometry::boxes::BoxTree;
+use crate::geometry::distance::place;
+use crate::geometry::exact::Point;
+use crate::geometry::sums::Bounds;
+use crate::geometry::tri_tri::{Triangle, do_cross};
+use crate::simplify::guard::Guard;
+use crate::simplify::heap::{Entry, Heap};
+use crate::simplify::legal::{self, Marks};
+use crate::simplify::partition;
+use crate::simplify::patch::{FIXED, FREE, MOST, Patch, Star};
+
+/// A short edge is cheaper by this share of its length, squared, where surfaces are flat, so that triangles stay round.
+const STABILITY: f64 = 1e-3;
+
+/// What holds of all cells.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Rules {
+    pub(super) shape: legal::Bounds,
+    /// The largest value of a quadric, without the share for short edges: a squared length.
+    pub(super) limit: f64,
+    /// New vertices may lie where the quadric is least, besides at the ends and the middle of the edge.
+    pub(super) optimal: bool,
+}
+
+/// A cell at work.
+pub(super) struct Work {
+    pub(super) patch: Patch,
+    pub(super) cell: partition::Cell,
+    /// Triangles of more than one cell that reach into this one, by the mesh's vertices and by points. They stay as they are.
+    pub(super) obstacles: Vec<([u32; 3], Triangle)>,
+    rules: Rules,
+    heap: Heap,
+    guard: Option<Guard>,
+    marks: Marks,
+    stars: [Star; 3],
+}
+
+impl Work {
+    /// O(n). With a guard, each collapse is tested exactly; without one, [`Work::is_crossed`] is to be asked in the end.
+    pub(super) fn new(
+        patch: Patch,
+        cell: partition::Cell,
+        obstacles: Vec<([u32; 3], Triangle)>,
+        rules: Rules,
+        is_guarded: bool,
+    ) -> Self {
+        let guard = is_guarded.then(|| Guard::new(&patch, obstacles.iter().map(|o| o.1).collect()));
+        let marks = Marks::new(patch.points.len());
+        let mut work = Self { patch, cell, obstacles, rules, heap: Heap::default(), guard, marks, stars: Default::default() };
+        let mut entries = Vec::with_capacity(work.patch.corners.len() / 2);
+        for corner in 0..work.patch.corners.len() {
+            let after = if corner % 3 == 2 { corner - 2 } else { corner + 1 };
+            let ends = [work.patch.corners[corner], work.patch.corners[after]];
+            // An edge of a vertex that is not fixed has two triangles, and is seen both ways.
+            if ends[0] < ends[1] {
+                entries.extend(work.entry(ends));
+            }
+        }
+        work.heap = Heap::new(entries);
+        work
+    }
+
+    fn entry(&self, ends: [u32; 2]) -> Option<Entry> {
+        let (value, cost, _) = self.price(ends)?;
+        let version = ends.iter().fold(0_u32, |sum, v| sum.wrapping_add(self.patch.versions[*v as usize]));
+        (value <= self.rules.limit).then_some(Entry { cost: cost as f32, ends, version })
+    }
+
+    /// The quadric's value, the cost, and the best place for the vertex that two become. The first one is no freer than the second.
+    #[inline]
+    fn price(&self, [u, v]: [u32; 2]) -> Option<(f64, f64, Point)> {
+        let (patch, [i, j]) = (&self.patch, [u as usize, v as usize]);
+        let kinds = [patch.kinds[i], patch.kinds[j]];
+        if kinds == [FIXED; 2] {
+            return None;
+        }
+        let from = place(patch.points[i]);
+        let edge = place(patch.points[j]) - from;
+        let sum = patch.quadrics[i].wide().plus(&patch.quadrics[j].wide().around(-edge));
+        let cost = |x: DVec3| {
+            let value = sum.at(x);
+            (value, value + STABILITY * STABILITY * (x.length_squared() + (x - edge).length_squared()))
+        };
+        if kinds[0] != kinds[1] {
+            let (x, point) = if kinds[0] > kinds[1] { (DVec3::ZERO, patch.points[i]) } else { (edge, patch.points[j]) };
+            let (value, cost) = cost(x);
+            return Some((value, cost, point));
+        }
+        let mut best = (cost(DVec3::ZERO), patch.points[i]);
+        let other = cost(edge);
+        if other.1 < best.0.1 {
+            best = (other, patch.points[j]);
+        }
+        let rounded = |x: DVec3| (from + x).to_array().map(|x| x as f32 + 0.0);
+        let least = (self.rules.optimal && kinds[0] == FREE)
+            .then(|| sum.least(2.0 * STABILITY * STABILITY, 0.5 * edge))
+            .filter(|x| x.length_squared() < 4.0 * edge.length_squared());
+        let x = least.unwrap_or(0.5 * edge);
+        let other = cost(x);
+        if other.1 < best.0.1 {
+            best = (other, rounded(x));
+        }
+        Some((best.0.0, best.0.1, best.1))
+    }
+
+    /// What the edges cost that are still to be looked at, stale ones among them.
+    pub(super) fn costs(&self) -> impl Iterator<Item = f32> + '_ {
+        self.heap.entries().iter().map(|entry| entry.cost)
+    }
+
+    /// Collapses edges that cost up to `most`, until no more than `count` triangles are left.
+    pub(super) fn advance(&mut self, most: f32, count: usize) {
+        let mut stars = std::mem::take(&mut self.stars);
+        while self.patch.live > count && self.heap.cheapest().is_some_and(|entry| entry.cost <= most) {
+            let Some(Entry { ends, version, .. }) = self.heap.pop() else { break };
+            let now = ends.iter().fold(0_u32, |sum, v| sum.wrapping_add(self.patch.versions[*v as usize]));
+            if now == version && ends.iter().all(|v| self.patch.is_there(*v)) {
+                self.collapse(ends, &mut stars);
+            }
+        }
+        self.stars = stars;
+    }
+
+    /// Collapses an edge if it may be.
+    fn collapse(&mut self, ends: [u32; 2], [of_u, of_v, spare]: &mut [Star; 3]) {
+        let Some((_, _, to)) = self.price(ends) else { return };
+        let [mut u, mut v] = ends;
+        if self.patch.kinds[u as usize] > self.patch.kinds[v as usize] || to == self.patch.points[u as usize] {
+            (u, v) = (v, u);
+        }
+        if !self.patch.star(u, of_u) || !self.patch.star(v, of_v) || of_u.len + of_v.len > MOST + 4 {
+            return;
+        }
+        let stays = to == self.patch.points[v as usize];
+        let shape = self.rules.shape;
+        let is_legal = self.cell.holds(&to)
+            && to.iter().all(|x| x.is_finite())
+            && legal::keeps_topology([u, v], of_u, of_v, &mut self.marks)
+            && legal::keeps_shape(&self.patch, [u, v], of_u, &to, shape.turn)
+            && (stays || legal::keeps_shape(&self.patch, [v, u], of_v, &to, shape.turn))
+            && legal::keeps_features(&self.patch, [u, v], of_u, shape.feature)
+            && of_u.iter().filter(|(_, ring)| ring.contains(&v)).all(|(_, ring)| ring.iter().all(|w| self.patch.star(*w, spare)))
+            && self.guard.as_mut().is_none_or(|guard| guard.allows(&self.patch, [u, v], &to, of_u, of_v));
+        if !is_legal {
+            return;
+        }
+        let patch = &mut self.patch;
+        let at = |w: u32| patch.quadrics[w as usize].wide().around(place(to) - place(patch.points[w as usize]));
+        patch.quadrics[v as usize] = at(u).plus(&at(v)).narrow();
+        patch.points[v as usize] = to;
+        patch.merge([u, v], of_u, of_v, spare);
+        if let Some(guard) = &mut self.guard {
+            guard.grow(patch, spare);
+        }
+        self.marks.clear();
+        for (_, ring) in spare.iter() {
+            for w in ring {
+                if self.marks.mark(w) {
+                    let entry = self.entry([v, w]);
+                    if let Some(entry) = entry {
+                        self.heap.push(entry);
+                    }
+                }
+            }
+        }
+    }
+
+    /// Does a triangle that was changed cross another one, or has a vertex that was moved come upon another one? `vertices`: their numbers in the
+    /// mesh; `was`: the triangles and the points as they were.
+    pub(super) fn is_crossed(&self, vertices: &[u32], was: &Patch) -> bool {
+        let patch = &self.patch;
+        let faces: Vec<(usize, [u32; 3])> = patch.faces().collect();
+        let triangles: Vec<Triangle> =
+            faces.iter().map(|(_, face)| patch.triangle(*face)).chain(self.obstacles.iter().map(|o| o.1)).collect();
+        let boxes: Vec<Bounds> = triangles.iter().map(|t| Bounds::of(t)).collect();
+        let has_moved = |v: u32| patch.points[v as usize] != was.points[v as usize];
+        let is_changed =
+            |i: usize| faces.get(i).is_some_and(|(f, face)| was.face(*f) != *face || face.iter().any(|v| has_moved(*v)));
+        if !(0..faces.len()).any(is_changed) {
+            return false;
+        }
+        let changed: Vec<bool> = (0..triangles.len()).map(is_changed).collect();
+        let number = |i: usize| match faces.get(i) {
+            Some((_, face)) => face.map(|v| vertices[v as usize]),
+            None => self.obstacles[i - faces.len()].0,
+        };
+        let tree = BoxTree::new(&boxes);
+        let mut found = false;
+        for i in (0..faces.len()).filter(|i| changed[*i]) {
+            let own = faces[i].1;
+            tree.each_meeting(&boxes[i], |j| {
+                let j = j as usize;
+                // Of two changed ones, the second looks.
+                if found || j == i || (changed[j] && j > i) {
+                    return;
+                }
+                let (other, at) = (number(j), &triangles[j]);
+                let is_on =
+                    |v: u32| at.iter().zip(other).any(|(p, w)| *p == patch.points[v as usize] && w != vertices[v as usize]);
+                found = own.iter().any(|v| (changed[j] || has_moved(*v)) && is_on(*v)) || do_cross(&triangles[i], at);
+            });
+            if found {
+                return true;
+            }
+        }
+        false
+    }
+}

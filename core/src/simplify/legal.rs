@@ -1,0 +1,118 @@
+//! May an edge collapse? What it does to connectivity, and to the triangles around it; what these may cross is asked elsewhere.
+
+use glam::DVec3;
+
+use crate::geometry::distance::place;
+use crate::geometry::exact::Point;
+use crate::simplify::patch::{CREASE, FIXED, FREE, Patch, Star};
+
+/// Triangles flatter than this share of an equilateral one's area are not made, unless they were flatter before.
+const LEAST_SHAPE: f64 = 0.03;
+
+/// Bounds of what a collapse may do.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Bounds {
+    /// The cosine of the largest angle by which a triangle may turn.
+    pub(super) turn: f64,
+    /// The cosine of the angle of triangles from which on their edge is a feature.
+    pub(super) feature: f64,
+}
+
+/// Scratch for marks of vertices.
+#[derive(Default)]
+pub(super) struct Marks {
+    of: Vec<u32>,
+    now: u32,
+}
+
+impl Marks {
+    pub(super) fn new(vertices: usize) -> Self {
+        Self { of: vec![0; vertices], now: 0 }
+    }
+
+    /// None is marked any more.
+    pub(super) fn clear(&mut self) {
+        if self.now == u32::MAX {
+            self.of.fill(0);
+            self.now = 0;
+        }
+        self.now += 1;
+    }
+
+    /// Marks one, and says whether it was not.
+    #[inline]
+    pub(super) fn mark(&mut self, v: u32) -> bool {
+        std::mem::replace(&mut self.of[v as usize], self.now) != self.now
+    }
+
+    #[inline]
+    pub(super) fn has(&self, v: u32) -> bool {
+        self.of[v as usize] == self.now
+    }
+}
+
+/// The link condition for an edge of a closed fan around `u` (Dey, Edelsbrunner, Guha & Nekhayev, "Topology preserving edge contraction", 1999): what both
+/// ends are joined to is joined to the edge, too.
+pub(super) fn keeps_topology([u, v]: [u32; 2], of_u: &Star, of_v: &Star, marks: &mut Marks) -> bool {
+    marks.clear();
+    for (_, [a, b]) in of_v.iter() {
+        marks.mark(a);
+        marks.mark(b);
+    }
+    let (mut common, mut shared, mut wings) = (0, 0, [u; 2]);
+    for (_, [a, b]) in of_u.iter() {
+        common += usize::from(marks.has(a));
+        if a == v || b == v {
+            if shared < 2 {
+                wings[shared] = if a == v { b } else { a };
+            }
+            shared += 1;
+        }
+    }
+    // The triangles of u and v beside an edge between the wings would become one with two sides.
+    let closes = |star: &Star| star.iter().any(|(_, ring)| ring == wings || ring == [wings[1], wings[0]]);
+    common == 2 && shared == 2 && wings[0] != wings[1] && !closes(of_u) && !closes(of_v)
+}
+
+/// Does each triangle of a star, but those with `gone`, keep its direction and its shape when its vertex goes to `to`?
+#[inline]
+pub(super) fn keeps_shape(patch: &Patch, [v, gone]: [u32; 2], star: &Star, to: &Point, turn: f64) -> bool {
+    let from = place(patch.points[v as usize]);
+    let to = place(*to);
+    star.iter().filter(|(_, ring)| !ring.contains(&gone)).all(|(_, [a, b])| {
+        let [a, b] = [a, b].map(|w| place(patch.points[w as usize]));
+        let (old, new) = ((a - from).cross(b - from), (a - to).cross(b - to));
+        let (old_square, new_square, dot) = (old.length_squared(), new.length_squared(), old.dot(new));
+        let edge = (b - a).length_squared();
+        let sides = |p: DVec3| edge + (a - p).length_squared() + (b - p).length_squared();
+        let keeps_direction =
+            if old_square > 0.0 { dot > 0.0 && dot * dot >= turn * turn * old_square * new_square } else { true };
+        // 2√3 times the doubled area over the sum of the squared sides: 1 for an equilateral triangle.
+        let (new_sides, old_sides) = (sides(to), sides(from));
+        let bound = LEAST_SHAPE * LEAST_SHAPE / 12.0;
+        let keeps_form = new_square > bound * new_sides * new_sides
+            || (new_square * old_sides * old_sides >= old_square * new_sides * new_sides
+                && new_square > 1e-12 * new_sides * new_sides);
+        keeps_direction && keeps_form
+    })
+}
+
+/// May they become one where features are kept? The less free one is the second.
+pub(super) fn keeps_features(patch: &Patch, [u, v]: [u32; 2], of_u: &Star, feature: f64) -> bool {
+    let kinds = [u, v].map(|w| patch.kinds[w as usize]);
+    match kinds {
+        [FREE, _] => true,
+        [CREASE, CREASE | FIXED] => angle_at(patch, v, of_u).is_some_and(|cosine| cosine < feature),
+        _ => false,
+    }
+}
+
+/// The cosine of the angle of the two triangles of a star that have `v`.
+fn angle_at(patch: &Patch, v: u32, star: &Star) -> Option<f64> {
+    let mut normals = star.iter().filter(|(_, ring)| ring.contains(&v)).map(|(corner, _)| {
+        let [a, b, c] = patch.triangle(patch.face(corner as usize / 3)).map(place);
+        (b - a).cross(c - a).normalize_or_zero()
+    });
+    let (first, second) = (normals.next()?, normals.next()?);
+    Some(first.dot(second))
+}

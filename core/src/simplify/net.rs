@@ -1,0 +1,93 @@
+//! The whole mesh between rounds: what is there of it, and what is known of its vertices.
+
+use rayon::prelude::*;
+
+use crate::algorithms::fans::{Around, corners_by_vertex};
+use crate::geometry::exact::Point;
+use crate::simplify::patch::{CREASE, FIXED, FREE};
+use crate::simplify::quadric::Quadric;
+
+/// A mesh by flat arrays.
+#[derive(Default)]
+pub(super) struct Net {
+    pub(super) points: Vec<Point>,
+    pub(super) quadrics: Vec<Quadric>,
+    pub(super) kinds: Vec<u8>,
+    pub(super) faces: Vec<[u32; 3]>,
+    /// The input's face in whose place a face stands.
+    pub(super) origins: Vec<u32>,
+    /// The input's vertex that a vertex was.
+    pub(super) homes: Vec<u32>,
+}
+
+/// What the vertices are taken for.
+pub(super) struct Constraints<'a> {
+    /// Vertices that stay as they are.
+    pub(super) fixed: &'a [bool],
+    /// The cosine of the angle between triangles from which on their edge is a feature.
+    pub(super) feature: f64,
+}
+
+impl Net {
+    /// O(n).
+    pub(super) fn new(points: &[Point], faces: &[[u32; 3]], constraints: &Constraints<'_>) -> Self {
+        let (starts, corners) = corners_by_vertex(points.len(), faces);
+        let known = (0..points.len()).into_par_iter().with_min_len(1 << 10).map(|v| {
+            let own = corners.get(starts[v] as usize..starts[v + 1] as usize).unwrap_or_default();
+            let is_fixed = constraints.fixed.get(v).copied().unwrap_or(false);
+            Around::new(points, faces, own).map_or((FIXED, Quadric::default()), |around| {
+                (if is_fixed { FIXED } else { kind(&around, constraints.feature) }, Quadric::of_normals(around.normals()))
+            })
+        });
+        let (kinds, quadrics) = known.unzip();
+        Self {
+            points: points.to_vec(),
+            quadrics,
+            kinds,
+            faces: faces.to_vec(),
+            origins: (0..faces.len() as u32).collect(),
+            homes: (0..points.len() as u32).collect(),
+        }
+    }
+}
+
+fn kind(around: &Around, feature: f64) -> u8 {
+    match around.features(feature) {
+        Some(0) => FREE,
+        Some(2) => CREASE,
+        _ => FIXED,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn creases_are_told_from_corners_and_flat_surface() {
+        // A cube of side 2 with a vertex in the middle of one edge, and one in a face.
+        let points = [[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [2.0, 2.0, 0.0], [0.0, 2.0, 0.0]];
+        let lift = points.map(|[x, y, _]: Point| [x, y, 2.0]);
+        let all: Vec<Point> = points.into_iter().chain(lift).chain([[1.0, 1.0, 2.0], [1.0, 0.0, 0.0]]).collect();
+        let faces = [
+            [0, 3, 9],
+            [3, 2, 9],
+            [2, 1, 9],
+            [4, 5, 8],
+            [5, 6, 8],
+            [6, 7, 8],
+            [7, 4, 8],
+            [0, 9, 4],
+            [9, 5, 4],
+            [9, 1, 5],
+            [1, 2, 6],
+            [1, 6, 5],
+            [2, 3, 7],
+            [2, 7, 6],
+            [3, 0, 4],
+            [3, 4, 7],
+        ];
+        let net = Net::new(&all, &faces, &Constraints { fixed: &[], feature: 0.8 });
+        assert_eq!(net.kinds, [FIXED, FIXED, FIXED, FIXED, FIXED, FIXED, FIXED, FIXED, FREE, CREASE]);
+    }
+}

@@ -1,0 +1,209 @@
+//! The triangles of one cell, in flat arrays, with the corners at each vertex in a ring of links: 24 bytes a triangle, nothing to allocate.
+//!
+//! Corner 3f + k is corner k of face f. All corners at one vertex are linked in a circle, in no order. Two circles become one by an exchange of two links.
+
+use crate::geometry::exact::Point;
+use crate::simplify::quadric::Quadric;
+use crate::util::ids::NONE;
+
+pub(super) use crate::algorithms::fans::MOST;
+
+/// What may become of a vertex; a higher one is less free.
+pub(super) const FREE: u8 = 0;
+/// It lies on a crease, and stays on it.
+pub(super) const CREASE: u8 = 1;
+/// It stays as it is.
+pub(super) const FIXED: u8 = 2;
+
+/// The triangles around a vertex.
+#[derive(Clone)]
+pub(super) struct Star {
+    pub(super) len: usize,
+    /// Their corners at the vertex.
+    pub(super) corners: [u32; MOST],
+    /// Their other vertices, in the triangle's sense.
+    pub(super) ring: [[u32; 2]; MOST],
+}
+
+impl Default for Star {
+    fn default() -> Self {
+        Self { len: 0, corners: [NONE; MOST], ring: [[NONE; 2]; MOST] }
+    }
+}
+
+impl Star {
+    /// Each triangle: its corner and its other vertices.
+    #[inline]
+    pub(super) fn iter(&self) -> impl Iterator<Item = (u32, [u32; 2])> + '_ {
+        self.corners.iter().copied().zip(self.ring.iter().copied()).take(self.len)
+    }
+}
+
+/// Triangles by their corners, with what is known of each vertex.
+#[derive(Clone, Default)]
+pub(super) struct Patch {
+    pub(super) points: Vec<Point>,
+    pub(super) quadrics: Vec<Quadric>,
+    pub(super) kinds: Vec<u8>,
+    /// How often a vertex, or its quadric, has changed.
+    pub(super) versions: Vec<u32>,
+    /// The vertex at each corner, [`NONE`] at those of triangles that are gone.
+    pub(super) corners: Vec<u32>,
+    /// The vertex that a vertex has become, itself while it is there.
+    pub(super) became: Vec<u32>,
+    next: Vec<u32>,
+    first: Vec<u32>,
+    /// Triangles that are there.
+    pub(super) live: usize,
+}
+
+#[inline]
+fn others(corner: u32) -> [u32; 2] {
+    match corner % 3 {
+        0 => [corner + 1, corner + 2],
+        1 => [corner + 1, corner - 1],
+        _ => [corner - 2, corner - 1],
+    }
+}
+
+impl Patch {
+    /// Of triangles by numbers of vertices, each of which has a point, a quadric and a kind.
+    pub(super) fn new(points: Vec<Point>, quadrics: Vec<Quadric>, kinds: Vec<u8>, corners: Vec<u32>) -> Self {
+        let count = points.len();
+        let mut next = vec![NONE; corners.len()];
+        let mut first = vec![NONE; count];
+        for (corner, v) in corners.iter().enumerate() {
+            let at = &mut first[*v as usize];
+            if *at == NONE {
+                (*at, next[corner]) = (corner as u32, corner as u32);
+            } else {
+                next[corner] = std::mem::replace(&mut next[*at as usize], corner as u32);
+            }
+        }
+        let live = corners.len() / 3;
+        Self {
+            points,
+            quadrics,
+            kinds,
+            versions: vec![0; count],
+            corners,
+            became: (0..count as u32).collect(),
+            next,
+            first,
+            live,
+        }
+    }
+
+    /// The triangles around a vertex; false if they are none, or too many.
+    #[inline]
+    pub(super) fn star(&self, v: u32, star: &mut Star) -> bool {
+        star.len = 0;
+        let first = self.first[v as usize];
+        if first == NONE {
+            return false;
+        }
+        let mut corner = first;
+        loop {
+            if star.len == MOST {
+                return false;
+            }
+            star.corners[star.len] = corner;
+            star.ring[star.len] = others(corner).map(|c| self.corners[c as usize]);
+            star.len += 1;
+            corner = self.next[corner as usize];
+            if corner == first {
+                return true;
+            }
+        }
+    }
+
+    /// The vertices of a triangle, by any of its corners.
+    #[inline]
+    pub(super) fn face(&self, face: usize) -> [u32; 3] {
+        [self.corners[3 * face], self.corners[3 * face + 1], self.corners[3 * face + 2]]
+    }
+
+    /// Lets a vertex have these corners, and no other ones.
+    #[inline]
+    fn link(&mut self, v: u32, corners: impl Iterator<Item = u32>) {
+        let (mut first, mut last) = (NONE, NONE);
+        for corner in corners {
+            if first == NONE {
+                first = corner;
+            } else {
+                self.next[last as usize] = corner;
+            }
+            last = corner;
+        }
+        if first != NONE {
+            self.next[last as usize] = first;
+        }
+        self.first[v as usize] = first;
+    }
+
+    /// Lets `u` become `v`, whose stars these are; the two triangles of both are gone. `spare` is overwritten by the star of `v`.
+    pub(super) fn merge(&mut self, [u, v]: [u32; 2], of_u: &Star, of_v: &Star, spare: &mut Star) {
+        let stays = |(corner, ring): (u32, [u32; 2]), gone: u32| (!ring.contains(&gone)).then_some(corner);
+        for (corner, ring) in of_u.iter().filter(|(_, ring)| ring.contains(&v)) {
+            let wing = if ring[0] == v { ring[1] } else { ring[0] };
+            for c in others(corner) {
+                self.corners[c as usize] = NONE;
+            }
+            self.corners[corner as usize] = NONE;
+            self.unlink(wing);
+            self.live -= 1;
+        }
+        for (corner, _) in of_u.iter().filter(|(_, ring)| !ring.contains(&v)) {
+            self.corners[corner as usize] = v;
+        }
+        let corners = of_u.iter().filter_map(|one| stays(one, v)).chain(of_v.iter().filter_map(|one| stays(one, u)));
+        self.link(v, corners);
+        self.first[u as usize] = NONE;
+        self.became[u as usize] = v;
+        for w in [u, v] {
+            self.versions[w as usize] = self.versions[w as usize].wrapping_add(1);
+        }
+        self.star(v, spare);
+    }
+
+    /// Lets go of the corners at a vertex that belong to triangles that are gone.
+    #[inline]
+    fn unlink(&mut self, v: u32) {
+        let first = self.first[v as usize];
+        let (mut corner, mut kept_first, mut kept_last) = (first, NONE, NONE);
+        loop {
+            let next = self.next[corner as usize];
+            if self.corners[corner as usize] != NONE {
+                if kept_first == NONE {
+                    kept_first = corner;
+                } else {
+                    self.next[kept_last as usize] = corner;
+                }
+                kept_last = corner;
+            }
+            if next == first {
+                break;
+            }
+            corner = next;
+        }
+        if kept_last != NONE {
+            self.next[kept_last as usize] = kept_first;
+        }
+        self.first[v as usize] = kept_first;
+    }
+
+    /// Is it there?
+    #[inline]
+    pub(super) fn is_there(&self, v: u32) -> bool {
+        self.first[v as usize] != NONE
+    }
+
+    /// The triangles that are there.
+    pub(super) fn faces(&self) -> impl Iterator<Item = (usize, [u32; 3])> + '_ {
+        self.corners.chunks_exact(3).enumerate().filter(|(_, c)| c[0] != NONE).map(|(f, c)| (f, [c[0], c[1], c[2]]))
+    }
+
+    pub(super) fn triangle(&self, face: [u32; 3]) -> [Point; 3] {
+        face.map(|v| self.points[v as usize])
+    }
+}

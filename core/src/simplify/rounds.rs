@@ -1,0 +1,235 @@
+//! Rounds: the mesh is parted into cells, each is simplified by itself with what it shares with others as it is, and all become one mesh again. The next
+//! round has other cells. Which collapses are done depends on the mesh alone: not on threads, nor on time.
+
+use rayon::prelude::*;
+
+use crate::geometry::sums::Bounds;
+use crate::geometry::tri_tri::Triangle;
+use crate::simplify::cell::{Rules, Work};
+use crate::simplify::net::Net;
+use crate::simplify::partition::{Parting, Partition};
+use crate::simplify::patch::{FIXED, Patch};
+use crate::util::ids::NONE;
+
+/// Each so many entries of a cell's heap stands for all of them.
+const SAMPLE: usize = 16;
+
+/// The share of collapses still wanted that a step looks for, so that none goes too far.
+const STEP: f64 = 0.7;
+
+/// Steps of a round, at most; each does about a half of what is left.
+const STEPS: usize = 24;
+
+/// The mesh in cells.
+struct Parted {
+    partition: Partition,
+    /// The place of a vertex in the order of all cells.
+    places: Vec<u32>,
+    /// Faces by cells, from where to where.
+    faces: Vec<u32>,
+    starts: Vec<usize>,
+    /// Triangles of several cells.
+    straddling: usize,
+    /// Vertices of such triangles.
+    is_shared: Vec<bool>,
+    /// By cells, which of these triangles reach into them.
+    obstacles: Vec<Vec<u32>>,
+}
+
+impl Parted {
+    fn new(net: &Net, parting: Parting) -> Self {
+        let partition = Partition::new(&net.points, parting);
+        let mut places = vec![0_u32; net.points.len()];
+        let mut cells = vec![0_u32; net.points.len()];
+        for (c, cell) in partition.cells.iter().enumerate() {
+            for (i, v) in partition.order.iter().enumerate().take(cell.end).skip(cell.start) {
+                (places[*v as usize], cells[*v as usize]) = (i as u32, c as u32);
+            }
+        }
+        let cell_of = |face: &[u32; 3]| {
+            let [a, b, c] = face.map(|v| cells[v as usize]);
+            if a == b && b == c { a } else { NONE }
+        };
+        let of_faces: Vec<u32> = net.faces.par_iter().with_min_len(1 << 12).map(cell_of).collect();
+        let mut starts = vec![0_usize; partition.cells.len() + 1];
+        of_faces.iter().filter(|c| **c != NONE).for_each(|c| starts[*c as usize + 1] += 1);
+        for c in 1..starts.len() {
+            starts[c] += starts[c - 1];
+        }
+        let mut ends = starts.clone();
+        let mut faces = vec![0_u32; starts.last().copied().unwrap_or(0)];
+        let (mut straddling, mut is_shared) = (0, vec![false; net.points.len()]);
+        let mut obstacles = vec![Vec::new(); partition.cells.len()];
+        for (f, c) in of_faces.iter().enumerate() {
+            if let Some(at) = ends.get_mut(*c as usize) {
+                faces[*at] = f as u32;
+                *at += 1;
+                continue;
+            }
+            straddling += 1;
+            let face = net.faces[f];
+            face.iter().for_each(|v| is_shared[*v as usize] = true);
+            let bounds = Bounds::of(&face.map(|v| net.points[v as usize]));
+            partition.each_meeting(&bounds, &mut |cell| obstacles[cell].push(f as u32));
+        }
+        Self { partition, places, faces, starts, straddling, is_shared, obstacles }
+    }
+
+    fn vertices(&self, c: usize) -> &[u32] {
+        let cell = &self.partition.cells[c];
+        &self.partition.order[cell.start..cell.end]
+    }
+
+    fn faces(&self, c: usize) -> &[u32] {
+        &self.faces[self.starts[c]..self.starts[c + 1]]
+    }
+
+    fn patch(&self, net: &Net, c: usize) -> Patch {
+        let (vertices, start) = (self.vertices(c), self.partition.cells[c].start as u32);
+        let points = vertices.iter().map(|v| net.points[*v as usize]).collect();
+        let quadrics = vertices.iter().map(|v| net.quadrics[*v as usize]).collect();
+        let kind = |v: &u32| if self.is_shared[*v as usize] { FIXED } else { net.kinds[*v as usize] };
+        let kinds = vertices.iter().map(kind).collect();
+        let corners =
+            self.faces(c).iter().flat_map(|f| net.faces[*f as usize].map(|v| self.places[v as usize] - start)).collect();
+        Patch::new(points, quadrics, kinds, corners)
+    }
+
+    fn work(&self, net: &Net, c: usize, rules: Rules, is_guarded: bool) -> Work {
+        let triangle = |f: &u32| -> ([u32; 3], Triangle) {
+            let face = net.faces[*f as usize];
+            (face, face.map(|v| net.points[v as usize]))
+        };
+        let obstacles = self.obstacles[c].iter().map(triangle).collect();
+        Work::new(self.patch(net, c), self.partition.cells[c], obstacles, rules, is_guarded)
+    }
+}
+
+/// What a round wants.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Goal {
+    /// Triangles of the whole mesh.
+    pub(super) triangles: usize,
+    /// How many times as many are left of those that a round may change, if it is not the last one.
+    pub(super) margin: f64,
+}
+
+/// Simplifies by one round. Returns what each vertex has become, by number in the new mesh, and how many cells had to be done again with a guard.
+pub(super) fn round(net: &mut Net, rules: Rules, parting: Parting, goal: Goal) -> (Vec<u32>, usize) {
+    let parted = Parted::new(net, parting);
+    let cells = parted.partition.cells.len();
+    let mut works: Vec<Work> = (0..cells).into_par_iter().with_max_len(1).map(|c| parted.work(net, c, rules, false)).collect();
+    let (own, straddling) = (parted.faces.len(), parted.straddling);
+    let wanted = if straddling == 0 {
+        goal.triangles
+    } else {
+        let share = own as f64 / (own + straddling) as f64;
+        ((goal.triangles as f64 * share * goal.margin) as usize).max(goal.triangles.saturating_sub(straddling))
+    };
+    advance(&mut works, wanted);
+    let redone: Vec<bool> = works
+        .par_iter_mut()
+        .enumerate()
+        .with_max_len(1)
+        .map(|(c, work)| {
+            let is_crossed =
+                work.patch.live < parted.faces(c).len() && work.is_crossed(parted.vertices(c), &parted.patch(net, c));
+            if is_crossed {
+                let live = work.patch.live;
+                *work = parted.work(net, c, rules, true);
+                work.advance(f32::INFINITY, live);
+            }
+            is_crossed
+        })
+        .collect();
+    let became = merge(net, &parted, works);
+    (became, redone.into_iter().filter(|was| *was).count())
+}
+
+/// Advances all cells, at about the same cost, until so many triangles are left in them.
+fn advance(works: &mut [Work], wanted: usize) {
+    if let [work] = works {
+        return work.advance(f32::INFINITY, wanted);
+    }
+    for step in 0..STEPS {
+        let live: usize = works.iter().map(|work| work.patch.live).sum();
+        let Some(excess) = live.checked_sub(wanted).filter(|excess| *excess > 0) else { return };
+        let samples: Vec<Vec<f32>> = works.par_iter().map(|work| work.costs().step_by(SAMPLE).collect()).collect();
+        let mut all: Vec<f32> = samples.iter().flatten().copied().collect();
+        let is_last = step + 1 == STEPS || excess < 4 * works.len();
+        let rank = (excess as f64 / 2.0 * STEP / SAMPLE as f64) as usize;
+        let most = if wanted == 0 || is_last || rank >= all.len() {
+            f32::INFINITY
+        } else {
+            *all.select_nth_unstable_by(rank, f32::total_cmp).1
+        };
+        let shares: Vec<usize> = samples.iter().map(|own| own.iter().filter(|cost| **cost <= most).count()).collect();
+        let sum: usize = shares.iter().sum();
+        works.par_iter_mut().with_max_len(1).zip(shares).for_each(|(work, share)| {
+            let removed = if sum == 0 { 0 } else { (excess as u128 * share as u128 / sum as u128) as usize };
+            let least = if wanted == 0 { 0 } else { work.patch.live.saturating_sub(removed) };
+            work.advance(most, least);
+        });
+        let left: usize = works.iter().map(|work| work.patch.live).sum();
+        if is_last || wanted == 0 || (left == live && most == f32::INFINITY) {
+            return;
+        }
+    }
+}
+
+/// Makes one mesh of all cells and what they share, in the old order. Returns what each old vertex has become.
+fn merge(net: &mut Net, parted: &Parted, works: Vec<Work>) -> Vec<u32> {
+    // What each vertex has become, by its old number.
+    let mut became: Vec<u32> = (0..net.points.len() as u32).collect();
+    let mut is_gone = vec![false; net.faces.len()];
+    for (c, work) in works.into_iter().enumerate() {
+        let vertices = parted.vertices(c);
+        let patch = work.patch;
+        for (i, v) in vertices.iter().enumerate() {
+            let mut at = i as u32;
+            while patch.became[at as usize] != at {
+                at = patch.became[at as usize];
+            }
+            became[*v as usize] = vertices[at as usize];
+            net.points[*v as usize] = patch.points[i];
+            net.quadrics[*v as usize] = patch.quadrics[i];
+        }
+        for (corners, f) in patch.corners.chunks_exact(3).zip(parted.faces(c)) {
+            is_gone[*f as usize] = corners[0] == NONE;
+            if let (&[a, b, c], false) = (corners, corners[0] == NONE) {
+                net.faces[*f as usize] = [a, b, c].map(|v| vertices[v as usize]);
+            }
+        }
+    }
+    compact(net, &mut became, &is_gone);
+    became
+}
+
+/// Lets go of what is gone.
+fn compact(net: &mut Net, became: &mut [u32], is_gone: &[bool]) {
+    let mut numbers = vec![NONE; net.points.len()];
+    let mut count = 0;
+    for v in 0..net.points.len() {
+        if became[v] == v as u32 {
+            numbers[v] = count as u32;
+            net.points[count] = net.points[v];
+            net.quadrics[count] = net.quadrics[v];
+            net.kinds[count] = net.kinds[v];
+            net.homes[count] = net.homes[v];
+            count += 1;
+        }
+    }
+    net.points.truncate(count);
+    net.quadrics.truncate(count);
+    net.kinds.truncate(count);
+    net.homes.truncate(count);
+    let mut left = 0;
+    for f in (0..net.faces.len()).filter(|f| !is_gone[*f]) {
+        net.faces[left] = net.faces[f].map(|v| numbers[v as usize]);
+        net.origins[left] = net.origins[f];
+        left += 1;
+    }
+    net.faces.truncate(left);
+    net.origins.truncate(left);
+    became.iter_mut().for_each(|v| *v = numbers[*v as usize]);
+}

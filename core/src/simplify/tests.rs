@@ -1,0 +1,167 @@
+use proptest::prelude::*;
+
+use super::*;
+use crate::geometry::self_crossing::{SelfCrossing, self_crossing};
+use crate::geometry::tri_tri::Triangle;
+
+/// A torus of n × n squares with bumps of a height.
+fn torus(n: u32, bumps: f64) -> (Vec<Point>, Vec<[u32; 3]>) {
+    let angle = |i: u32| f64::from(i) / f64::from(n) * std::f64::consts::TAU;
+    let point = |i: u32| {
+        let (u, v) = (angle(i / n), angle(i % n));
+        let r = 1.0 + bumps * (5.0 * u).sin() * (3.0 * v).cos();
+        let out = 3.0 + r * v.cos();
+        [out * u.cos(), out * u.sin(), r * v.sin()].map(|x| x as f32)
+    };
+    let at = |i: u32, j: u32| i % n * n + j % n;
+    let squares = (0..n * n).map(|s| (s / n, s % n));
+    let faces = squares.flat_map(|(i, j)| {
+        let [a, b, c, d] = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
+        [[a, b, c], [a, c, d]]
+    });
+    ((0..n * n).map(point).collect(), faces.collect())
+}
+
+fn all<'a>(points: &'a [Point], faces: &'a [[u32; 3]]) -> Input<'a> {
+    Input { points, faces, region: None, fixed: None }
+}
+
+fn triangles(points: &[Point], faces: &[[u32; 3]]) -> Vec<Triangle> {
+    faces.iter().map(|f| f.map(|v| points[v as usize])).collect()
+}
+
+/// Each edge is run along once each way.
+fn is_closed(faces: &[[u32; 3]]) -> bool {
+    let mut edges: Vec<[u32; 2]> = faces.iter().flat_map(|f| [[f[0], f[1]], [f[1], f[2]], [f[2], f[0]]]).collect();
+    edges.sort_unstable();
+    edges.windows(2).all(|two| two[0] != two[1]) && edges.iter().all(|e| edges.binary_search(&[e[1], e[0]]).is_ok())
+}
+
+#[test]
+fn a_torus_in_many_cells_stays_a_torus() {
+    let (points, faces) = torus(40, 0.1);
+    let options = Options { triangles: Some(800), ..Options::default() };
+    let outcome = in_cells(&all(&points, &faces), &options, 200).unwrap();
+    assert!(is_closed(&outcome.faces));
+    assert_eq!(outcome.points.len(), outcome.faces.len() / 2, "Euler's number is 0, as that of the input");
+    // Cells as small as these leave a little between them, after three rounds.
+    assert!(outcome.faces.len() <= 840, "{}", outcome.faces.len());
+    assert_eq!(self_crossing(&triangles(&outcome.points, &outcome.faces), u64::MAX), SelfCrossing::None);
+}
+
+#[test]
+fn the_result_does_not_depend_on_threads() {
+    let (points, faces) = torus(40, 0.1);
+    let options = Options { triangles: Some(900), ..Options::default() };
+    let with =
+        |threads: usize| crate::util::parallel::in_pool(threads, || in_cells(&all(&points, &faces), &options, 150).unwrap());
+    let (one, four) = (with(1), with(4));
+    assert_eq!((one.points, one.faces, one.proved), (four.points, four.faces, four.proved));
+}
+
+#[test]
+fn a_deviation_is_kept_and_a_larger_one_leaves_less() {
+    let (points, faces) = torus(40, 0.1);
+    let left = [0.002, 0.01, 0.05].map(|d| {
+        let options = Options { max_deviation: Some(d), ..Options::default() };
+        let outcome = in_cells(&all(&points, &faces), &options, 300).unwrap();
+        let proved = outcome.proved.unwrap();
+        assert!(proved.forward.max(proved.backward) <= d);
+        outcome.faces.len()
+    });
+    assert!(left[0] > left[1] && left[1] > left[2] && left[2] < faces.len() / 2, "{left:?}");
+}
+
+#[test]
+fn what_may_not_change_has_the_same_bits() {
+    let (points, faces) = torus(30, 0.1);
+    let region: Vec<bool> = (0..faces.len()).map(|f| f < faces.len() / 2).collect();
+    let options = Options { triangles: Some(0), ..Options::default() };
+    let outcome = in_cells(&Input { region: Some(&region), ..all(&points, &faces) }, &options, 200).unwrap();
+    let kept: Vec<u32> = outcome.origins.iter().copied().filter(|f| *f != NONE).collect();
+    let outside: Vec<u32> = (faces.len() as u32 / 2..faces.len() as u32).collect();
+    assert!(outside.iter().all(|f| kept.contains(f)));
+    for (face, origin) in outcome.faces.iter().zip(&outcome.origins).filter(|(_, origin)| **origin != NONE) {
+        let was = faces[*origin as usize].map(|v| points[v as usize]);
+        assert_eq!(face.map(|v| outcome.points[v as usize]), was);
+    }
+    assert!(outcome.faces.len() < faces.len() * 2 / 3);
+}
+
+/// A cube whose sides are grids: with features, its twelve edges stay, and its volume with them.
+#[test]
+fn edges_of_a_cube_stay_where_they_are() {
+    let n = 8_u32;
+    let mut soup: Vec<Triangle> = Vec::new();
+    for (axis, side) in (0..3).flat_map(|axis| [(axis, 0_u32), (axis, n)]) {
+        let at = |i: u32, j: u32| {
+            let mut p = [0.0; 3];
+            p[axis] = side as f32;
+            // The sides at the far end are turned round.
+            let (x, y) = if side == 0 { (j, i) } else { (i, j) };
+            (p[(axis + 1) % 3], p[(axis + 2) % 3]) = (x as f32, y as f32);
+            p
+        };
+        for (i, j) in (0..n * n).map(|s| (s / n, s % n)) {
+            let [a, b, c, d] = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
+            soup.extend([[a, b, c], [a, c, d]]);
+        }
+    }
+    let mut points: Vec<Point> = soup.iter().flatten().copied().collect();
+    points.sort_by(|a, b| a.partial_cmp(b).unwrap());
+    points.dedup();
+    let number = |p: &Point| points.iter().position(|q| q == p).unwrap() as u32;
+    let faces: Vec<[u32; 3]> = soup.iter().map(|t| [number(&t[0]), number(&t[1]), number(&t[2])]).collect();
+    assert!(is_closed(&faces));
+    let options = Options { feature_angle: Some(0.5), max_deviation: Some(1e-3), ..Options::default() };
+    let outcome = simplify(&all(&points, &faces), &options).unwrap();
+    assert!(outcome.faces.len() <= 40, "{}", outcome.faces.len());
+    let proved = outcome.proved.unwrap();
+    assert!(proved.forward.max(proved.backward) < 1e-6, "only rounding: {proved:?}");
+    let is_on_edge = |p: &Point| p.iter().filter(|x| **x == 0.0 || **x == n as f32).count() >= 2;
+    assert!(points.iter().filter(|p| p.iter().all(|x| *x == 0.0 || *x == n as f32)).all(|p| outcome.points.contains(p)));
+    assert!(is_closed(&outcome.faces) && outcome.points.iter().filter(|p| is_on_edge(p)).count() >= 8);
+}
+
+#[test]
+fn what_is_no_mesh_is_refused() {
+    let refused = |points: &[Point], faces: &[[u32; 3]]| simplify(&all(points, faces), &Options::default()).err();
+    assert_eq!(refused(&[[0.0; 3]; 3], &[[0, 1, 2], [0, 1, 3]]), Some(Error::NoVertex(1)));
+    assert_eq!(refused(&[[0.0; 3], [f32::NAN, 0.0, 0.0]], &[]), Some(Error::NotFinite(1)));
+    assert_eq!(refused(&[], &[]), None);
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+    /// Two sheets, bent alike and nearer to each other than the bends are high, so that collapses would make them cross.
+    #[test]
+    fn sheets_that_are_near_each_other_do_not_cross(heights in prop::collection::vec(0u8..8, 144), gap in 0.02f32..0.3, left in 40usize..300) {
+        let n = 12_u32;
+        let mut points: Vec<Point> = Vec::new();
+        let mut faces = Vec::new();
+        for sheet in 0..2 {
+            let height = |i: u32| f32::from(heights[i as usize]) / 8.0 + gap * sheet as f32;
+            points.extend((0..n * n).map(|i| [(i % n) as f32, (i / n) as f32, height(i)]));
+            let squares = (0..n * n).filter(|i| i % n + 1 < n && i / n + 1 < n);
+            faces.extend(squares.map(|i| i + sheet * n * n).flat_map(|a| [[a, a + 1, a + n + 1], [a, a + n + 1, a + n]]));
+        }
+        prop_assert_eq!(self_crossing(&triangles(&points, &faces), u64::MAX), SelfCrossing::None);
+        let options = Options { triangles: Some(left), ..Options::default() };
+        let outcome = in_cells(&all(&points, &faces), &options, 100).unwrap();
+        prop_assert_eq!(self_crossing(&triangles(&outcome.points, &outcome.faces), u64::MAX), SelfCrossing::None);
+        prop_assert!(outcome.faces.len() < faces.len());
+    }
+
+    /// Any faces between a few points: nothing breaks, and what is called unchanged is.
+    #[test]
+    fn faces_without_sense_break_nothing(p in prop::collection::vec(prop::array::uniform3(-3i8..4), 1..12), f in prop::collection::vec(prop::array::uniform3(0u32..12), 0..40), cell in 1usize..9) {
+        let points: Vec<Point> = p.iter().map(|v| v.map(f32::from)).collect();
+        let faces: Vec<[u32; 3]> = f.iter().map(|f| f.map(|v| v % points.len() as u32)).collect();
+        let options = Options { triangles: Some(2), ..Options::default() };
+        let outcome = in_cells(&all(&points, &faces), &options, cell).unwrap();
+        for (face, origin) in outcome.faces.iter().zip(&outcome.origins) {
+            let now = face.map(|v| outcome.points[v as usize]);
+            prop_assert!(*origin == NONE || now == faces[*origin as usize].map(|v| points[v as usize]));
+        }
+    }
+}

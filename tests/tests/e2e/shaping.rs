@@ -1,0 +1,142 @@
+//! Fewer triangles and smoother surfaces, on the built binary: within the distance that is proved, told, and the same for any threads.
+
+use std::f64::consts::{PI, TAU};
+
+use serde_json::Value;
+use suture_bench::judge::judge;
+use suture_tests::Place;
+use suture_tests::stl::{self, Triangle};
+
+/// Rows and columns of the sphere, and its radius.
+const ROWS: usize = 60;
+const COLUMNS: usize = 120;
+const RADIUS: f64 = 10.0;
+/// The sphere's chords are no farther below it than this: of the widest cell, from its middle.
+const CHORD: f64 = 0.03;
+
+/// A sphere whose surface is moved outwards by so much at each corner of its grid, by row and column.
+fn sphere(out: impl Fn(usize, usize) -> f64) -> Vec<Triangle> {
+    let point = |row: usize, column: usize| {
+        let column = if row == 0 || row == ROWS { 0 } else { column % COLUMNS };
+        let (down, around) = (PI * row as f64 / ROWS as f64, TAU * column as f64 / COLUMNS as f64);
+        let radius = RADIUS + out(row, column);
+        [down.sin() * around.cos(), down.sin() * around.sin(), down.cos()].map(|x| (radius * x) as f32)
+    };
+    let mut all = Vec::new();
+    for row in 0..ROWS {
+        for column in 0..COLUMNS {
+            let [a, b] = [point(row, column), point(row, column + 1)];
+            let [c, d] = [point(row + 1, column + 1), point(row + 1, column)];
+            if row > 0 {
+                all.push([a, d, b]);
+            }
+            if row + 1 < ROWS {
+                all.push([b, d, c]);
+            }
+        }
+    }
+    all
+}
+
+fn norm(point: [f64; 3]) -> f64 {
+    point.iter().map(|x| x * x).sum::<f64>().sqrt()
+}
+
+/// The largest distance of corners, and of the middles of triangles, from the sphere.
+fn off(triangles: &[Triangle]) -> f64 {
+    let places = |[a, b, c]: &Triangle| {
+        let middle = [0, 1, 2].map(|k| (f64::from(a[k]) + f64::from(b[k]) + f64::from(c[k])) / 3.0);
+        [a, b, c].map(|point| point.map(f64::from)).into_iter().chain([middle])
+    };
+    triangles.iter().flat_map(places).map(|place| (norm(place) - RADIUS).abs()).fold(0.0, f64::max)
+}
+
+fn read(place: &Place, name: &str) -> Vec<Triangle> {
+    stl::records(&place.read(name)).iter().map(stl::corners).collect()
+}
+
+/// Runs a command on `in.stl`, and what its report says.
+fn run(place: &Place, command: &str, options: &[&str]) -> Value {
+    let paths = ["in.stl", "-o", "out.stl", "--report", "report.json", "--force"];
+    place.suture([&[command], &paths[..], options].concat()).expect(0);
+    serde_json::from_slice(&place.read("report.json")).unwrap()
+}
+
+#[test]
+fn fewer_triangles_are_as_near_as_is_proved() {
+    let place = Place::new();
+    let before = sphere(|_, _| 0.0);
+    place.put("in.stl", &stl::mesh(&before));
+    for options in [["--ratio", "0.25"], ["--triangles", "3000"], ["--max-deviation", "0.1"]] {
+        let made = ["1", "2"].map(|threads| {
+            let told = run(&place, "simplify", &[&options[..], &["--threads", threads]].concat());
+            let simplified = &told["simplified"];
+            let proved = simplified["to_result"].as_f64().unwrap().max(simplified["from_result"].as_f64().unwrap());
+            let after = read(&place, "out.stl");
+            assert_eq!(
+                (simplified["before"].as_u64(), simplified["after"].as_u64()),
+                (Some(before.len() as u64), Some(after.len() as u64))
+            );
+            assert!(off(&after) <= proved + CHORD, "{options:?}: {} of {proved}", off(&after));
+            assert!(proved > 0.0 && proved < 0.2, "{options:?}: {simplified}");
+            let bound = match options {
+                ["--ratio", _] => before.len() / 4,
+                ["--triangles", _] => 3000,
+                _ => before.len() / 2,
+            };
+            assert!(after.len() <= bound, "{options:?}: {} triangles", after.len());
+            assert_eq!(told["verdict"]["good"].as_bool(), Some(true), "{told}");
+            place.read("out.stl")
+        });
+        assert!(made[0] == made[1], "{options:?}");
+        assert!(judge(&place.at("out.stl")).unwrap().sound(), "{options:?}");
+    }
+    let refused = place.suture(["simplify", "in.stl", "-o", "new.stl"]).expect(2).stderr();
+    assert!(refused.contains("--ratio") && !place.at("new.stl").exists(), "{refused}");
+}
+
+/// Every second row stands out: waves of two rows, whose height is measured at the corners.
+#[test]
+fn waves_are_smoothed_and_the_volume_stays() {
+    let place = Place::new();
+    let before = sphere(|row, _| if row % 2 == 0 { 0.05 } else { -0.05 });
+    place.put("in.stl", &stl::mesh(&before));
+    let told = run(&place, "smooth", &["--waves-below", "2.2"]);
+    let after = read(&place, "out.stl");
+    // Away from the poles, where the grid is no longer even.
+    let height = |triangles: &[Triangle]| {
+        let corners = triangles.iter().flatten().filter(|point| f64::from(point[2]).abs() < 0.7 * RADIUS);
+        let (sum, count) =
+            corners.fold((0.0, 0.0), |(sum, count), point| (sum + (norm(point.map(f64::from)) - RADIUS).abs(), count + 1.0));
+        sum / count
+    };
+    assert!(height(&after) < 0.35 * height(&before), "{} of {}", height(&after), height(&before));
+    let smoothed = &told["smoothed"];
+    let volume = 4.0 / 3.0 * PI * RADIUS.powi(3);
+    assert!((smoothed["volume_change"].as_f64().unwrap() / volume).abs() < 0.01, "{smoothed}");
+    let farthest = before.iter().flatten().zip(after.iter().flatten());
+    assert!(
+        after.len() == before.len() && farthest.count() > 0 && smoothed["displacement"].as_f64().unwrap() < 0.15,
+        "{smoothed}"
+    );
+    assert!(judge(&place.at("out.stl")).unwrap().sound());
+}
+
+/// A hole is closed first; a profile says how few triangles are wanted, in a hot folder, too.
+#[test]
+fn a_profile_asks_for_fewer_triangles() {
+    let place = Place::new();
+    let mut part = sphere(|_, _| 0.0);
+    part.truncate(part.len() - 40);
+    place.put("in.stl", &stl::mesh(&part));
+    place.put("small.toml", b"simplify_ratio = 0.3\nsimplify_within_mm = 0.2\n");
+    let told = run(&place, "repair", &["--profile", "small.toml"]);
+    let names: Vec<&str> = told["repairs"].as_array().unwrap().iter().filter_map(|repair| repair["name"].as_str()).collect();
+    assert!(names.contains(&"fill") && names.last() == Some(&"simplify"), "{names:?}");
+    assert_eq!(told["edit"]["deleted"].as_u64().is_some_and(|deleted| deleted > 0), true, "{told}");
+    let after = read(&place, "out.stl");
+    assert!(after.len() <= part.len() * 3 / 10 + 20, "{}", after.len());
+    assert!(judge(&place.at("out.stl")).unwrap().sound());
+    let said = place.suture(["repair", "in.stl", "-o", "again.stl", "--profile", "small.toml"]).expect(0).stdout();
+    assert!(said.contains("proved within"), "{said}");
+}

@@ -10,16 +10,17 @@ use crate::util::parallel;
 /// Of the volume, a mesh may lose or gain so much by smoothing.
 const VOLUME: f64 = 0.01;
 /// More passes than these are no smoothing of waves any more.
-const PASSES: usize = 1000;
+const PASSES: usize = 10_000;
 
 /// The mesh with its waves smoothed, or why that cannot be.
 pub(super) fn smooth(mesh: &Mesh, work: Work<'_>) -> Result<Change, String> {
     let profile = work.profile;
     let edge = mean_edge(mesh).ok_or("it has no edges")?;
-    let (filter, length) = (Filter::default(), profile.smooth_waves_below_mm);
-    let passes = filter.passes(length / edge, profile.smooth_leaves).ok_or_else(|| {
-        format!("its edges are {edge:.3e} long in the mean: waves of {length} are shorter than two of them, or too long for the filter")
-    })?;
+    let length = profile.smooth_waves_below_mm;
+    let filter = Filter::of_waves(length / edge);
+    let found = filter.and_then(|filter| Some((filter, filter.passes(length / edge, profile.smooth_leaves)?)));
+    let (filter, passes) = found
+        .ok_or_else(|| format!("its edges are {edge:.3e} long in the mean: waves of {length} are shorter than two of them"))?;
     if passes > PASSES {
         return Err(format!("it would take {passes} passes, and more than {PASSES} change more than waves"));
     }

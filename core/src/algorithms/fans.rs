@@ -1,4 +1,4 @@
-//! The triangles around each vertex, and whether they form one closed fan.
+//! The triangles around each vertex, and whether they form one fan, closed or open.
 
 use glam::DVec3;
 
@@ -26,12 +26,35 @@ pub(crate) fn corners_by_vertex(vertices: usize, faces: &[[u32; 3]]) -> (Vec<u32
     (starts, corners)
 }
 
-/// The normals of the triangles around a vertex, from one to the next, if they form one closed fan of triangles with areas.
+/// How the triangles around a vertex hang together.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Fan {
+    /// Each has one before and one behind.
+    Closed,
+    /// One is the first, and one the last: the vertex lies on a rim.
+    Open,
+    /// No fan, or several.
+    Other,
+}
+
+/// The rim at a vertex.
+pub(crate) struct Rim {
+    /// Unit vectors across its two edges, in their triangles.
+    pub(crate) across: [DVec3; 2],
+    /// The cosine of the angle between its edges; 1 where it goes straight on.
+    pub(crate) cosine: f64,
+    /// Other edges of the vertex that are features.
+    pub(crate) features: usize,
+}
+
+/// The normals of the triangles around a vertex, from one to the next, if they form one fan of triangles with areas.
 pub(crate) struct Around {
     count: usize,
     normals: [DVec3; MOST],
     neighbours: [u32; MOST],
-    is_closed: bool,
+    fan: Fan,
+    /// The edges of the first triangle and of the last one that have no other.
+    ends: [DVec3; 2],
 }
 
 impl Around {
@@ -47,22 +70,39 @@ impl Around {
             *ring = [face[(k + 1) % 3], face[(k + 2) % 3]];
         }
         let count = corners.len();
-        let is_closed = count > 2 && in_order(&mut rings[..count]);
+        let fan = in_order(&mut rings[..count]);
         let centre = faces[corners[0] as usize / 3][corners[0] as usize % 3];
         let p = place(points[centre as usize]);
         let mut normals = [DVec3::ZERO; MOST];
         for (normal, [a, b]) in normals.iter_mut().zip(rings).take(count) {
             *normal = (place(points[a as usize]) - p).cross(place(points[b as usize]) - p).normalize_or_zero();
         }
-        Some(Self { count, normals, neighbours: rings.map(|ring| ring[0]), is_closed })
+        let ends = [rings[0][0], rings[count - 1][1]].map(|w| place(points[w as usize]) - p);
+        Some(Self { count, normals, neighbours: rings.map(|ring| ring[0]), fan, ends })
     }
 
     /// How many of its edges are features: where the cosine of the angle between normals is below `feature`. None where the fan is not closed.
     pub(crate) fn features(&self, feature: f64) -> Option<usize> {
         let normals = &self.normals[..self.count];
         let before = normals.iter().cycle().skip(self.count - 1);
-        let is_sharp = |n: &DVec3, m: &DVec3| *n != DVec3::ZERO && *m != DVec3::ZERO && n.dot(*m) < feature;
-        self.is_closed.then(|| normals.iter().zip(before).filter(|(n, m)| is_sharp(n, m)).count())
+        (self.fan == Fan::Closed).then(|| normals.iter().zip(before).filter(|(n, m)| is_sharp(n, m, feature)).count())
+    }
+
+    /// Do they form one closed fan?
+    pub(crate) fn is_closed(&self) -> bool {
+        self.fan == Fan::Closed
+    }
+
+    /// The rim, where the fan is open and its edges there have a length.
+    pub(crate) fn rim(&self, feature: f64) -> Option<Rim> {
+        let normals = &self.normals[..self.count];
+        let [first, last] = [*normals.first()?, *normals.last()?];
+        let ways = self.ends.map(DVec3::normalize_or_zero);
+        (self.fan == Fan::Open && ways.iter().all(|way| *way != DVec3::ZERO)).then(|| Rim {
+            across: [ways[0].cross(first), ways[1].cross(last)],
+            cosine: -ways[0].dot(ways[1]),
+            features: normals.windows(2).filter(|two| is_sharp(&two[0], &two[1], feature)).count(),
+        })
     }
 
     /// The unit normals, zero for triangles without an area.
@@ -76,18 +116,31 @@ impl Around {
     }
 }
 
-/// Puts the sides of a fan in order; false if they are no closed fan of different vertices.
-fn in_order(rings: &mut [[u32; 2]]) -> bool {
+fn is_sharp(n: &DVec3, m: &DVec3, feature: f64) -> bool {
+    *n != DVec3::ZERO && *m != DVec3::ZERO && n.dot(*m) < feature
+}
+
+/// Puts the sides of a fan of different vertices in order, and tells how they hang together.
+fn in_order(rings: &mut [[u32; 2]]) -> Fan {
+    let is_first = |i: &usize| rings.iter().all(|ring| ring[1] != rings[*i][0]);
+    let mut starts = (0..rings.len()).filter(is_first);
+    let start = starts.next();
+    if starts.next().is_some() {
+        return Fan::Other;
+    }
+    rings.swap(0, start.unwrap_or(0));
     let first = rings[0][0];
     for i in 0..rings.len() - 1 {
         let wanted = rings[i][1];
-        if wanted == first {
-            return false;
-        }
-        let Some(next) = (i + 1..rings.len()).find(|j| rings[*j][0] == wanted) else { return false };
-        rings.swap(i + 1, next);
+        let mut next = (i + 1..rings.len()).filter(|j| rings[*j][0] == wanted);
+        let (Some(one), None, false) = (next.next(), next.next(), wanted == first) else { return Fan::Other };
+        rings.swap(i + 1, one);
     }
-    rings[rings.len() - 1][1] == first
+    let last = rings[rings.len() - 1][1];
+    if last == first {
+        return if rings.len() > 2 { Fan::Closed } else { Fan::Other };
+    }
+    if start.is_some() && rings.iter().all(|ring| ring[0] != last) { Fan::Open } else { Fan::Other }
 }
 
 #[cfg(test)]
@@ -95,11 +148,34 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_fan_is_closed_if_its_sides_follow_each_other_once() {
-        assert!(in_order(&mut [[1, 2], [3, 1], [2, 3]]));
-        assert!(!in_order(&mut [[1, 2], [2, 3], [3, 4]]), "open");
-        assert!(!in_order(&mut [[1, 2], [2, 1], [3, 4], [4, 3]]), "two fans");
-        assert!(!in_order(&mut [[1, 2], [2, 1], [1, 3], [3, 1]]), "two fans with an edge in common");
-        assert!(!in_order(&mut [[1, 2], [3, 2], [3, 1]]), "not all run the same way");
+    fn a_fan_is_closed_or_open_if_its_sides_follow_each_other_once() {
+        assert_eq!(in_order(&mut [[1, 2], [3, 1], [2, 3]]), Fan::Closed);
+        assert_eq!(in_order(&mut [[2, 3], [1, 2], [3, 4]]), Fan::Open);
+        assert_eq!(in_order(&mut [[1, 2]]), Fan::Open);
+        let others: [&mut [[u32; 2]]; 7] = [
+            // Two triangles on each other.
+            &mut [[1, 2], [2, 1]],
+            // Two fans; with an edge in common; open ones.
+            &mut [[1, 2], [2, 1], [3, 4], [4, 3]],
+            &mut [[1, 2], [2, 1], [1, 3], [3, 1]],
+            &mut [[1, 2], [3, 4]],
+            // Not all run the same way.
+            &mut [[1, 2], [3, 2], [3, 1]],
+            // An edge of three triangles, and one of four.
+            &mut [[1, 2], [2, 3], [3, 2]],
+            &mut [[1, 2], [2, 3], [3, 2], [2, 4], [4, 1]],
+        ];
+        assert!(others.into_iter().all(|rings| in_order(rings) == Fan::Other));
+    }
+
+    /// The middle of a side of a flat square, seen from the square.
+    #[test]
+    fn a_rim_that_goes_straight_on_is_told() {
+        let points = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]];
+        let faces = [[0, 2, 3], [0, 1, 2]];
+        let around = Around::new(&points, &faces, &[0, 3]).unwrap();
+        let rim = around.rim(0.5).unwrap();
+        assert_eq!((rim.cosine, rim.features, around.is_closed()), (1.0, 0, false));
+        assert!(rim.across.iter().all(|n| *n == DVec3::Y || *n == DVec3::NEG_Y));
     }
 }

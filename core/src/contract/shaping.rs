@@ -78,6 +78,9 @@ pub struct Simplified {
     pub to_result: f64,
     /// No place of the result is farther than this from the mesh before; proved.
     pub from_result: f64,
+    /// Change of the volume.
+    #[serde(default)]
+    pub volume_change: f64,
     /// Why nothing was simplified, or why more triangles are left than asked for.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub why_not: Option<String>,

@@ -9,7 +9,8 @@
 //! distance from the first surface to the second. It is continuous, so the degree with which it covers a face is one whole number for all of the
 //! inside, if no rim of what is mapped runs there; the signed areas of the images sum up to it (Cohen, Manocha & Olano, "Successive mappings", IJCGA
 //! 13(1), 2003, for maps between meshes; Outerelo & Ruiz, "Mapping degree theory", 2009, for the degree). Where it is not zero, each place of the face is
-//! an image, and so not farther from the first surface.
+//! an image, and so not farther from the first surface. The rim of the first surface is mapped onto that of the second, so that it runs inside of no face
+//! ([`rim`]).
 //!
 //! Triangles whose image is not found, and faces without such a degree, are bounded by [`search`]: a triangle is as near to another one as the
 //! farthest of its corners, as the distance from a convex set is a convex function; else it is halved.
@@ -17,6 +18,7 @@
 mod chain;
 mod fill;
 mod pairing;
+mod rim;
 mod search;
 mod surface;
 #[cfg(test)]
@@ -31,7 +33,8 @@ use crate::geometry::distance::place;
 use crate::proof::chain::{Lent, Pair};
 use crate::proof::fill::Piece;
 pub(crate) use crate::proof::pairing::Pairing;
-use crate::proof::surface::{Spot, Surface};
+use crate::proof::rim::Rims;
+use crate::proof::surface::{Spot, Surface, WALK};
 use crate::util::ids::NONE;
 
 /// The unit of sums of areas, as a share of a face: whole numbers, whose sum does not depend on their order.
@@ -42,9 +45,6 @@ const ROUNDING: f64 = 1e-13;
 
 /// A bound may be larger than the distance of the farthest vertex by this share before it is worth a search.
 const SLACK: f64 = 1.02;
-
-/// Steps from face to face towards the nearest one, at most.
-const WALK: usize = 24;
 
 /// Each so many distances stand for all, and one of so many of these vertices is looked at again, so many rings of faces wide.
 const SAMPLE: usize = 8;
@@ -75,18 +75,23 @@ struct Found {
 }
 
 /// Proves bounds, and names the triangles of the first mesh that are, or may be, farther than `most`, or near to what is. O(n) where the meshes are alike.
-pub(crate) fn prove(pairing: &Pairing<'_>, most: f64) -> (Proved, Vec<u32>) {
+/// If it is not to be `tight`, bounds are no better than `most`.
+pub(crate) fn prove(pairing: &Pairing<'_>, most: f64, tight: bool) -> (Proved, Vec<u32>) {
     let surface = Surface::new(pairing.new_points, pairing.new_faces);
     let images: Vec<Option<(Spot, f64)>> =
         (0..pairing.points.len()).into_par_iter().with_min_len(BLOCK).map(|v| image(&surface, pairing, v)).collect();
-    let images = with_better_ones(&surface, pairing, images);
+    let mut images = with_better_ones(&surface, pairing, images);
+    let rim = Rims::new(pairing);
+    for v in rim.vertices() {
+        images[v] = rim::image(&surface, pairing, v).or(images[v]);
+    }
     let covered: Vec<AtomicI64> = (0..pairing.new_faces.len()).map(|_| AtomicI64::new(0)).collect();
     let size = pairing.points.iter().chain(pairing.new_points).flatten().fold(0.0_f32, |m, x| m.max(x.abs()));
     // As vertices are about so far, no bound can be much better; where a bound is wanted, no better one is needed.
     let farthest_vertex = images.par_iter().flatten().map(|image| image.1).reduce(|| 0.0, f64::max);
-    let tight = (farthest_vertex * SLACK).max(f64::from(size) * ROUNDING);
-    let aim = if most.is_finite() { most } else { tight };
-    let map = Map { surface: &surface, pairing, images: &images, covered: &covered, aim };
+    let least = (farthest_vertex * SLACK).max(f64::from(size) * ROUNDING);
+    let aim = if most.is_finite() && !tight { most } else { least.min(most) };
+    let map = Map { surface: &surface, pairing, images: &images, rim: &rim, covered: &covered, aim };
     let blocks = pairing.faces.len().div_ceil(BLOCK);
     let found: Vec<Found> = (0..blocks).into_par_iter().with_max_len(1).map(|block| map.block(block)).collect();
     let farthest = found.iter().map(|f| f.farthest).fold(0.0, f64::max);
@@ -204,6 +209,7 @@ struct Map<'m> {
     surface: &'m Surface<'m>,
     pairing: &'m Pairing<'m>,
     images: &'m [Option<(Spot, f64)>],
+    rim: &'m Rims,
     covered: &'m [AtomicI64],
     aim: f64,
 }
@@ -230,7 +236,7 @@ impl Map<'_> {
                 continue;
             };
             let farthest = a.1.max(b.1).max(c.1);
-            if let Some(common) = self.surface.common(&[a.0, b.0, c.0]) {
+            if let Some(common) = self.surface.common(&[a.0, b.0, c.0]).filter(|_| self.keeps_rim(face, [a.0, b.0, c.0])) {
                 add(self.surface, self.covered, common, &[a.0, b.0, c.0]);
                 if farthest > self.aim {
                     found.failed.push(f as u32);
@@ -245,15 +251,24 @@ impl Map<'_> {
         found
     }
 
+    /// Do the sides that are of the rim go onto edges?
+    fn keeps_rim(&self, face: [u32; 3], spots: [Spot; 3]) -> bool {
+        let goes_inside = |k: usize| {
+            let next = (k + 1) % 3;
+            self.rim.has(face[k], face[next]) && !rim::on_edge(self.surface, &[spots[k], spots[next]])
+        };
+        !(0..3).any(goes_inside)
+    }
+
     /// Maps a triangle that does not go into one face.
     fn across(&self, f: u32, of: ([u32; 3], [(Spot, f64); 3]), lent: &mut Scratch, found: &mut Found) {
         let Scratch { pieces, spots, .. } = lent;
         pieces.clear();
         spots.clear();
-        let farthest = map_across(self.surface, self.pairing, of, self.aim, lent);
+        let farthest = self.cut(of, lent, found);
         if farthest.is_none() {
             found.failed.push(f);
-            rims(self.surface, self.pairing, of, self.aim, &mut lent.chain, &mut found.rims);
+            self.rims(of, &mut lent.chain, &mut found.rims);
             return;
         }
         let mut start = 0;
@@ -267,6 +282,71 @@ impl Map<'_> {
                 // It covers what it covers, but from too far.
                 found.failed.push(f);
                 found.rims.extend(lent.pieces.iter().map(|piece| piece.0));
+            }
+        }
+    }
+
+    /// Appends what is between two ends of a side; false if there is no way. Where the rim goes into faces, these are named.
+    fn side(
+        &self,
+        ([from, to], is_rim): ([&Pair; 2], bool),
+        chain: &mut Lent,
+        out: &mut Vec<Pair>,
+        inside: &mut Vec<u32>,
+    ) -> bool {
+        if is_rim && rim::between(self.surface, [from, to], out) {
+            return true;
+        }
+        let start = out.len();
+        if !chain::between(self.surface, [from, to], self.aim, chain, out) {
+            return false;
+        }
+        if is_rim {
+            inside.extend(self.faces_along([from, to], &out[start..]));
+        }
+        true
+    }
+
+    /// The faces from one spot to the next.
+    fn faces_along(&self, [from, to]: [&Pair; 2], between: &[Pair]) -> Vec<u32> {
+        let mut spots = vec![from.spot];
+        spots.extend(between.iter().map(|pair| pair.spot));
+        spots.push(to.spot);
+        spots.windows(2).filter_map(|two| self.surface.common(two)).collect()
+    }
+
+    /// Cuts a triangle that does not go into one face into pieces, in `lent`; returns how far its farthest corner or cut goes, if it can be mapped.
+    fn cut(&self, (face, spots): ([u32; 3], [(Spot, f64); 3]), lent: &mut Scratch, found: &mut Found) -> Option<f64> {
+        let Scratch { chain, rim, piece, pieces, spots: all } = lent;
+        rim.clear();
+        for (k, (from, to, turned)) in sides(self.pairing, face, spots).into_iter().enumerate() {
+            rim.push(if turned { to } else { from });
+            let start = rim.len();
+            let is_rim = self.rim.has(face[k], face[(k + 1) % 3]);
+            if !self.side(([&from, &to], is_rim), chain, rim, &mut found.rims) {
+                return None;
+            }
+            if turned {
+                rim[start..].reverse();
+            }
+        }
+        let triangle = face.map(|v| place(self.pairing.points[v as usize]));
+        let mut farthest = 0.0_f64;
+        let is_mapped = fill::fill(self.surface, &triangle, rim, piece, &mut |part: Piece<'_>| {
+            all.extend(part.corners.iter().map(|pair| pair.spot));
+            farthest = part.corners.iter().map(|pair| pair.off).fold(farthest, f64::max);
+            pieces.push((part.face, all.len()));
+        });
+        is_mapped.then_some(farthest)
+    }
+
+    /// The faces in which the sides of a triangle run.
+    fn rims(&self, (face, spots): ([u32; 3], [(Spot, f64); 3]), lent: &mut Lent, out: &mut Vec<u32>) {
+        for (from, to, _) in sides(self.pairing, face, spots) {
+            let mut between = Vec::new();
+            // Where there is no way, the triangle beyond fails as well, and no rim runs there.
+            if chain::between(self.surface, [&from, &to], self.aim, lent, &mut between) {
+                out.extend(self.faces_along([&from, &to], &between));
             }
         }
     }
@@ -297,53 +377,4 @@ fn sides(pairing: &Pairing<'_>, face: [u32; 3], spots: [(Spot, f64); 3]) -> [(Pa
         let turned = face[k] > face[(k + 1) % 3];
         if turned { (pair(k + 1), pair(k), true) } else { (pair(k), pair(k + 1), false) }
     })
-}
-
-/// Cuts a triangle that does not go into one face into pieces, in `lent`; returns how far its farthest corner or cut goes, if it can be mapped.
-fn map_across(
-    surface: &Surface<'_>,
-    pairing: &Pairing<'_>,
-    (face, spots): ([u32; 3], [(Spot, f64); 3]),
-    aim: f64,
-    lent: &mut Scratch,
-) -> Option<f64> {
-    let Scratch { chain, rim, piece, pieces, spots: all } = lent;
-    rim.clear();
-    for (from, to, turned) in sides(pairing, face, spots) {
-        rim.push(if turned { to } else { from });
-        let start = rim.len();
-        if !chain::between(surface, [&from, &to], aim, chain, rim) {
-            return None;
-        }
-        if turned {
-            rim[start..].reverse();
-        }
-    }
-    let triangle = face.map(|v| place(pairing.points[v as usize]));
-    let mut farthest = 0.0_f64;
-    let is_mapped = fill::fill(surface, &triangle, rim, piece, &mut |part: Piece<'_>| {
-        all.extend(part.corners.iter().map(|pair| pair.spot));
-        farthest = part.corners.iter().map(|pair| pair.off).fold(farthest, f64::max);
-        pieces.push((part.face, all.len()));
-    });
-    is_mapped.then_some(farthest)
-}
-
-/// The faces in which the sides of a triangle run.
-fn rims(
-    surface: &Surface<'_>,
-    pairing: &Pairing<'_>,
-    (face, spots): ([u32; 3], [(Spot, f64); 3]),
-    aim: f64,
-    lent: &mut Lent,
-    out: &mut Vec<u32>,
-) {
-    for (from, to, _) in sides(pairing, face, spots) {
-        let mut chain = vec![from];
-        // Where there is no way, the triangle beyond fails as well, and no rim runs there.
-        if chain::between(surface, [&from, &to], aim, lent, &mut chain) {
-            chain.push(to);
-            out.extend(chain.windows(2).filter_map(|two| surface.common(&[two[0].spot, two[1].spot])));
-        }
-    }
 }

@@ -10,4 +10,6 @@ pub(crate) struct Pairing<'a> {
     pub(crate) new_points: &'a [Point],
     pub(crate) new_faces: &'a [[u32; 3]],
     pub(crate) became: &'a [u32],
+    /// The vertices of the first mesh whose triangles form no closed fan, or more of them.
+    pub(crate) open: &'a [u32],
 }

@@ -5,6 +5,9 @@ use glam::DVec3;
 use crate::geometry::distance::{place, share_along};
 use crate::geometry::exact::Point;
 
+/// Steps from face to face towards the nearest one, at most.
+pub(crate) const WALK: usize = 24;
+
 /// A mesh with its faces by vertices.
 pub(super) struct Surface<'a> {
     pub(super) points: &'a [Point],

@@ -11,27 +11,37 @@ use crate::simplify::guard::Guard;
 use crate::simplify::heap::{Entry, Heap};
 use crate::simplify::legal::{self, Marks};
 use crate::simplify::partition;
-use crate::simplify::patch::{FIXED, FREE, MOST, Patch, Star};
+use crate::simplify::patch::{CREASE, FIXED, MOST, Patch, RIM, Star};
 
 /// A short edge is cheaper by this share of its length, squared, where surfaces are flat, so that triangles stay round.
 const STABILITY: f64 = 1e-3;
+
+/// How many limits there are.
+pub(super) const LIMITS: usize = 3;
 
 /// What holds of all cells.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Rules {
     pub(super) shape: legal::Bounds,
-    /// The largest value of a quadric, without the share for short edges: a squared length.
-    pub(super) limit: f64,
+    /// The largest value of a quadric by its weight, without the share for short edges: a squared length, by how strict a vertex is.
+    pub(super) limits: [f64; LIMITS],
     /// New vertices may lie where the quadric is least, besides at the ends and the middle of the edge.
     pub(super) optimal: bool,
 }
+
+/// A triangle of more than one cell, by the mesh's vertices and by points.
+pub(super) type Obstacle = ([u32; 3], Triangle);
 
 /// A cell at work.
 pub(super) struct Work {
     pub(super) patch: Patch,
     pub(super) cell: partition::Cell,
     /// Triangles of more than one cell that reach into this one, by the mesh's vertices and by points. They stay as they are.
-    pub(super) obstacles: Vec<([u32; 3], Triangle)>,
+    pub(super) obstacles: Vec<Obstacle>,
+    /// Edges of such triangles with both ends in this cell, the smaller one first, in order.
+    outer: Vec<[u32; 2]>,
+    /// Edges were left alone because of what their quadrics would be.
+    pub(super) is_limited: bool,
     rules: Rules,
     heap: Heap,
     guard: Option<Guard>,
@@ -44,19 +54,31 @@ impl Work {
     pub(super) fn new(
         patch: Patch,
         cell: partition::Cell,
-        obstacles: Vec<([u32; 3], Triangle)>,
+        (obstacles, outer): (Vec<Obstacle>, Vec<[u32; 2]>),
         rules: Rules,
         is_guarded: bool,
     ) -> Self {
         let guard = is_guarded.then(|| Guard::new(&patch, obstacles.iter().map(|o| o.1).collect()));
         let marks = Marks::new(patch.points.len());
-        let mut work = Self { patch, cell, obstacles, rules, heap: Heap::default(), guard, marks, stars: Default::default() };
+        let mut work = Self {
+            patch,
+            cell,
+            obstacles,
+            outer,
+            is_limited: false,
+            rules,
+            heap: Heap::default(),
+            guard,
+            marks,
+            stars: Default::default(),
+        };
         let mut entries = Vec::with_capacity(work.patch.corners.len() / 2);
         for corner in 0..work.patch.corners.len() {
             let after = if corner % 3 == 2 { corner - 2 } else { corner + 1 };
             let ends = [work.patch.corners[corner], work.patch.corners[after]];
-            // An edge of a vertex that is not fixed has two triangles, and is seen both ways.
-            if ends[0] < ends[1] {
+            // An edge of a vertex that is not fixed has two triangles, and is seen both ways; or it may be of the rim.
+            let may_be_rim = || ends.iter().all(|v| work.patch.kinds[*v as usize] >= RIM);
+            if ends[0] < ends[1] || may_be_rim() {
                 entries.extend(work.entry(ends));
             }
         }
@@ -64,26 +86,32 @@ impl Work {
         work
     }
 
-    fn entry(&self, ends: [u32; 2]) -> Option<Entry> {
+    fn entry(&mut self, ends: [u32; 2]) -> Option<Entry> {
         let (value, cost, _) = self.price(ends)?;
+        let strict = ends.iter().map(|v| usize::from(self.patch.strict[*v as usize])).fold(0, usize::max);
+        if value > self.rules.limits[strict.min(LIMITS - 1)] {
+            self.is_limited = true;
+            return None;
+        }
         let version = ends.iter().fold(0_u32, |sum, v| sum.wrapping_add(self.patch.versions[*v as usize]));
-        (value <= self.rules.limit).then_some(Entry { cost: cost as f32, ends, version })
+        Some(Entry { cost: cost as f32, ends, version })
     }
 
-    /// The quadric's value, the cost, and the best place for the vertex that two become. The first one is no freer than the second.
+    /// The quadric's value by its weight, the cost, and the best place for the vertex that two become. The first one is no freer than the second.
     #[inline]
     fn price(&self, [u, v]: [u32; 2]) -> Option<(f64, f64, Point)> {
         let (patch, [i, j]) = (&self.patch, [u as usize, v as usize]);
         let kinds = [patch.kinds[i], patch.kinds[j]];
-        if kinds == [FIXED; 2] {
+        if kinds == [FIXED; 2] || kinds == [CREASE, RIM] || kinds == [RIM, CREASE] {
             return None;
         }
         let from = place(patch.points[i]);
         let edge = place(patch.points[j]) - from;
         let sum = patch.quadrics[i].wide().plus(&patch.quadrics[j].wide().around(-edge));
+        let share = sum.weight().max(1.0).recip();
         let cost = |x: DVec3| {
             let value = sum.at(x);
-            (value, value + STABILITY * STABILITY * (x.length_squared() + (x - edge).length_squared()))
+            (value * share, value + STABILITY * STABILITY * (x.length_squared() + (x - edge).length_squared()))
         };
         if kinds[0] != kinds[1] {
             let (x, point) = if kinds[0] > kinds[1] { (DVec3::ZERO, patch.points[i]) } else { (edge, patch.points[j]) };
@@ -96,7 +124,7 @@ impl Work {
             best = (other, patch.points[j]);
         }
         let rounded = |x: DVec3| (from + x).to_array().map(|x| x as f32 + 0.0);
-        let least = (self.rules.optimal && kinds[0] == FREE)
+        let least = (self.rules.optimal && kinds[0] != CREASE)
             .then(|| sum.least(2.0 * STABILITY * STABILITY, 0.5 * edge))
             .filter(|x| x.length_squared() < 4.0 * edge.length_squared());
         let x = least.unwrap_or(0.5 * edge);
@@ -137,9 +165,15 @@ impl Work {
         }
         let stays = to == self.patch.points[v as usize];
         let shape = self.rules.shape;
+        let is_rim = self.patch.kinds[u as usize] == RIM;
+        let is_joined = |w: u32| {
+            self.patch.kinds[v as usize] == FIXED
+                && self.patch.kinds[w as usize] == FIXED
+                && self.outer.binary_search(&[v.min(w), v.max(w)]).is_ok()
+        };
         let is_legal = self.cell.holds(&to)
             && to.iter().all(|x| x.is_finite())
-            && legal::keeps_topology([u, v], of_u, of_v, &mut self.marks)
+            && legal::keeps_topology(([u, v], is_rim), of_u, of_v, &mut self.marks, is_joined)
             && legal::keeps_shape(&self.patch, [u, v], of_u, &to, shape.turn)
             && (stays || legal::keeps_shape(&self.patch, [v, u], of_v, &to, shape.turn))
             && legal::keeps_features(&self.patch, [u, v], of_u, shape.feature)

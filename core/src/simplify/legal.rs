@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use crate::geometry::distance::place;
 use crate::geometry::exact::Point;
-use crate::simplify::patch::{CREASE, FIXED, FREE, Patch, Star};
+use crate::simplify::patch::{CREASE, FIXED, FREE, Patch, RIM, Star};
 
 /// Triangles flatter than this share of an equilateral one's area are not made, unless they were flatter before.
 const LEAST_SHAPE: f64 = 0.03;
@@ -51,9 +51,16 @@ impl Marks {
     }
 }
 
-/// The link condition for an edge of a closed fan around `u` (Dey, Edelsbrunner, Guha & Nekhayev, "Topology preserving edge contraction", 1999): what both
-/// ends are joined to is joined to the edge, too.
-pub(super) fn keeps_topology([u, v]: [u32; 2], of_u: &Star, of_v: &Star, marks: &mut Marks) -> bool {
+/// The link condition for an edge of one fan around `u` (Dey, Edelsbrunner, Guha & Nekhayev, "Topology preserving edge contraction", 1999): what both
+/// ends are joined to is joined to the edge, too. Where `u` lies on a rim, the edge does; the outside counts as one more vertex, that all of the rim is
+/// joined to. `is_joined`: by an edge of other cells' triangles, to `v`.
+pub(super) fn keeps_topology(
+    ([u, v], is_rim): ([u32; 2], bool),
+    of_u: &Star,
+    of_v: &Star,
+    marks: &mut Marks,
+    is_joined: impl Fn(u32) -> bool,
+) -> bool {
     marks.clear();
     for (_, [a, b]) in of_v.iter() {
         marks.mark(a);
@@ -62,6 +69,8 @@ pub(super) fn keeps_topology([u, v]: [u32; 2], of_u: &Star, of_v: &Star, marks: 
     let (mut common, mut shared, mut wings) = (0, 0, [u; 2]);
     for (_, [a, b]) in of_u.iter() {
         common += usize::from(marks.has(a));
+        // The last one of an open fan is the first of no triangle.
+        common += usize::from(is_rim && marks.has(b) && of_u.iter().all(|(_, ring)| ring[0] != b));
         if a == v || b == v {
             if shared < 2 {
                 wings[shared] = if a == v { b } else { a };
@@ -71,6 +80,15 @@ pub(super) fn keeps_topology([u, v]: [u32; 2], of_u: &Star, of_v: &Star, marks: 
     }
     // The triangles of u and v beside an edge between the wings would become one with two sides.
     let closes = |star: &Star| star.iter().any(|(_, ring)| ring == wings || ring == [wings[1], wings[0]]);
+    let is_wing = |w: u32| wings[..shared.min(2)].contains(&w);
+    if of_u.iter().any(|(_, ring)| ring.iter().any(|w| *w != v && !is_wing(*w) && is_joined(*w))) {
+        return false;
+    }
+    if is_rim {
+        // The last triangle of a surface does not go.
+        let goes_on = |star: &Star, other: u32| star.iter().any(|(_, ring)| ring.contains(&wings[0]) && !ring.contains(&other));
+        return common == 1 && shared == 1 && (goes_on(of_u, v) || goes_on(of_v, u));
+    }
     common == 2 && shared == 2 && wings[0] != wings[1] && !closes(of_u) && !closes(of_v)
 }
 
@@ -102,6 +120,8 @@ pub(super) fn keeps_features(patch: &Patch, [u, v]: [u32; 2], of_u: &Star, featu
     let kinds = [u, v].map(|w| patch.kinds[w as usize]);
     match kinds {
         [FREE, _] => true,
+        // That its edge is of the rim, the link condition has told.
+        [RIM, RIM | FIXED] => true,
         [CREASE, CREASE | FIXED] => angle_at(patch, v, of_u).is_some_and(|cosine| cosine < feature),
         _ => false,
     }

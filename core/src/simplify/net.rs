@@ -4,8 +4,12 @@ use rayon::prelude::*;
 
 use crate::algorithms::fans::{Around, corners_by_vertex};
 use crate::geometry::exact::Point;
-use crate::simplify::patch::{CREASE, FIXED, FREE};
+use crate::simplify::patch::{CREASE, FIXED, FREE, RIM};
 use crate::simplify::quadric::Quadric;
+
+/// What a plane across an edge of the rim counts for (Garland & Heckbert, section 6): a vertex has two of them, and six planes of triangles where there is no
+/// rim, so that the rim keeps its shape as well as the surface does.
+const RIM_WEIGHT: f64 = 3.0;
 
 /// A mesh by flat arrays.
 #[derive(Default)]
@@ -13,17 +17,23 @@ pub(super) struct Net {
     pub(super) points: Vec<Point>,
     pub(super) quadrics: Vec<Quadric>,
     pub(super) kinds: Vec<u8>,
+    /// By which of the limits a vertex is judged.
+    pub(super) strict: Vec<u8>,
     pub(super) faces: Vec<[u32; 3]>,
     /// The input's face in whose place a face stands.
     pub(super) origins: Vec<u32>,
     /// The input's vertex that a vertex was.
     pub(super) homes: Vec<u32>,
+    /// The input's vertices whose triangles form no closed fan.
+    pub(super) open: Vec<u32>,
 }
 
 /// What the vertices are taken for.
 pub(super) struct Constraints<'a> {
     /// Vertices that stay as they are.
     pub(super) fixed: &'a [bool],
+    /// By which of the limits they are judged, if not by the first.
+    pub(super) strict: &'a [u8],
     /// The cosine of the angle between triangles from which on their edge is a feature.
     pub(super) feature: f64,
 }
@@ -35,18 +45,26 @@ impl Net {
         let known = (0..points.len()).into_par_iter().with_min_len(1 << 10).map(|v| {
             let own = corners.get(starts[v] as usize..starts[v + 1] as usize).unwrap_or_default();
             let is_fixed = constraints.fixed.get(v).copied().unwrap_or(false);
-            Around::new(points, faces, own).map_or((FIXED, Quadric::default()), |around| {
-                (if is_fixed { FIXED } else { kind(&around, constraints.feature) }, Quadric::of_normals(around.normals()))
+            Around::new(points, faces, own).map_or(((FIXED, true), Quadric::default()), |around| {
+                let rim = around.rim(constraints.feature);
+                let across = rim.iter().flat_map(|rim| rim.across).map(|n| n * RIM_WEIGHT.sqrt());
+                let quadric = Quadric::of_normals(around.normals().chain(across));
+                let kind = if is_fixed { FIXED } else { kind(&around, constraints.feature) };
+                ((kind, !around.is_closed()), quadric)
             })
         });
-        let (kinds, quadrics) = known.unzip();
+        let (known, quadrics): (Vec<(u8, bool)>, _) = known.unzip();
+        let open = (0..).zip(&known).filter(|(_, known)| known.1).map(|(v, _)| v).collect();
+        let kinds = known.into_iter().map(|known| known.0).collect();
         Self {
             points: points.to_vec(),
             quadrics,
             kinds,
+            strict: (0..points.len()).map(|v| constraints.strict.get(v).copied().unwrap_or(0)).collect(),
             faces: faces.to_vec(),
             origins: (0..faces.len() as u32).collect(),
             homes: (0..points.len() as u32).collect(),
+            open,
         }
     }
 }
@@ -55,13 +73,27 @@ fn kind(around: &Around, feature: f64) -> u8 {
     match around.features(feature) {
         Some(0) => FREE,
         Some(2) => CREASE,
-        _ => FIXED,
+        Some(_) => FIXED,
+        // A corner of a rim is a feature as an edge is.
+        None => match around.rim(feature) {
+            Some(rim) if rim.features == 0 && rim.cosine >= feature => RIM,
+            _ => FIXED,
+        },
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn sides_of_a_sheet_are_told_from_its_corners() {
+        let points: Vec<Point> = (0..9).map(|i| [(i % 3) as f32, (i / 3) as f32, 0.0]).collect();
+        let faces: Vec<[u32; 3]> = [0, 1, 3, 4].into_iter().flat_map(|a| [[a, a + 1, a + 4], [a, a + 4, a + 3]]).collect();
+        let net = Net::new(&points, &faces, &Constraints { fixed: &[], strict: &[], feature: 0.8 });
+        assert_eq!(net.kinds, [FIXED, RIM, FIXED, RIM, FREE, RIM, FIXED, RIM, FIXED]);
+        assert_eq!(net.open, [0, 1, 2, 3, 5, 6, 7, 8]);
+    }
 
     #[test]
     fn creases_are_told_from_corners_and_flat_surface() {
@@ -87,7 +119,7 @@ mod tests {
             [3, 0, 4],
             [3, 4, 7],
         ];
-        let net = Net::new(&all, &faces, &Constraints { fixed: &[], feature: 0.8 });
+        let net = Net::new(&all, &faces, &Constraints { fixed: &[], strict: &[], feature: 0.8 });
         assert_eq!(net.kinds, [FIXED, FIXED, FIXED, FIXED, FIXED, FIXED, FIXED, FIXED, FREE, CREASE]);
     }
 }

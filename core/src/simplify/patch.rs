@@ -12,8 +12,10 @@ pub(super) use crate::algorithms::fans::MOST;
 pub(super) const FREE: u8 = 0;
 /// It lies on a crease, and stays on it.
 pub(super) const CREASE: u8 = 1;
+/// It lies on the rim of a surface, and stays on it.
+pub(super) const RIM: u8 = 2;
 /// It stays as it is.
-pub(super) const FIXED: u8 = 2;
+pub(super) const FIXED: u8 = 3;
 
 /// The triangles around a vertex.
 #[derive(Clone)]
@@ -45,6 +47,8 @@ pub(super) struct Patch {
     pub(super) points: Vec<Point>,
     pub(super) quadrics: Vec<Quadric>,
     pub(super) kinds: Vec<u8>,
+    /// By which of the limits a vertex is judged; a higher one is stricter.
+    pub(super) strict: Vec<u8>,
     /// How often a vertex, or its quadric, has changed.
     pub(super) versions: Vec<u32>,
     /// The vertex at each corner, [`NONE`] at those of triangles that are gone.
@@ -67,8 +71,8 @@ fn others(corner: u32) -> [u32; 2] {
 }
 
 impl Patch {
-    /// Of triangles by numbers of vertices, each of which has a point, a quadric and a kind.
-    pub(super) fn new(points: Vec<Point>, quadrics: Vec<Quadric>, kinds: Vec<u8>, corners: Vec<u32>) -> Self {
+    /// Of triangles by numbers of vertices, each of which has a point, a quadric, a kind and a limit.
+    pub(super) fn new(points: Vec<Point>, quadrics: Vec<Quadric>, [kinds, strict]: [Vec<u8>; 2], corners: Vec<u32>) -> Self {
         let count = points.len();
         let mut next = vec![NONE; corners.len()];
         let mut first = vec![NONE; count];
@@ -85,6 +89,7 @@ impl Patch {
             points,
             quadrics,
             kinds,
+            strict,
             versions: vec![0; count],
             corners,
             became: (0..count as u32).collect(),
@@ -160,6 +165,7 @@ impl Patch {
         self.link(v, corners);
         self.first[u as usize] = NONE;
         self.became[u as usize] = v;
+        self.strict[v as usize] = self.strict[v as usize].max(self.strict[u as usize]);
         for w in [u, v] {
             self.versions[w as usize] = self.versions[w as usize].wrapping_add(1);
         }

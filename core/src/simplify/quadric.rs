@@ -71,6 +71,12 @@ impl Wide {
         (x.dot(self.times(x) + 2.0 * self.b) + self.c).max(0.0)
     }
 
+    /// How many planes it is of, by their weights: the sum of the squares of their unit normals.
+    #[inline]
+    pub(super) fn weight(&self) -> f64 {
+        self.a[0] + self.a[3] + self.a[5]
+    }
+
     /// Where q(x) + w|x − m|² is least, for w > 0. By Cramer's rule: the matrix is positive definite.
     #[inline]
     pub(super) fn least(&self, w: f64, m: DVec3) -> DVec3 {

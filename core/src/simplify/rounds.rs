@@ -4,8 +4,7 @@
 use rayon::prelude::*;
 
 use crate::geometry::sums::Bounds;
-use crate::geometry::tri_tri::Triangle;
-use crate::simplify::cell::{Rules, Work};
+use crate::simplify::cell::{Obstacle, Rules, Work};
 use crate::simplify::net::Net;
 use crate::simplify::partition::{Parting, Partition};
 use crate::simplify::patch::{FIXED, Patch};
@@ -28,12 +27,12 @@ struct Parted {
     /// Faces by cells, from where to where.
     faces: Vec<u32>,
     starts: Vec<usize>,
-    /// Triangles of several cells.
-    straddling: usize,
     /// Vertices of such triangles.
     is_shared: Vec<bool>,
     /// By cells, which of these triangles reach into them.
     obstacles: Vec<Vec<u32>>,
+    /// By cells, edges of these triangles with both ends in them, by numbers of vertices in the cell.
+    outer: Vec<Vec<[u32; 2]>>,
 }
 
 impl Parted {
@@ -58,21 +57,30 @@ impl Parted {
         }
         let mut ends = starts.clone();
         let mut faces = vec![0_u32; starts.last().copied().unwrap_or(0)];
-        let (mut straddling, mut is_shared) = (0, vec![false; net.points.len()]);
+        let mut is_shared = vec![false; net.points.len()];
         let mut obstacles = vec![Vec::new(); partition.cells.len()];
+        let mut outer = vec![Vec::new(); partition.cells.len()];
         for (f, c) in of_faces.iter().enumerate() {
             if let Some(at) = ends.get_mut(*c as usize) {
                 faces[*at] = f as u32;
                 *at += 1;
                 continue;
             }
-            straddling += 1;
             let face = net.faces[f];
             face.iter().for_each(|v| is_shared[*v as usize] = true);
             let bounds = Bounds::of(&face.map(|v| net.points[v as usize]));
             partition.each_meeting(&bounds, &mut |cell| obstacles[cell].push(f as u32));
+            for k in 0..3 {
+                let ends = [face[k], face[(k + 1) % 3]];
+                let [c, d] = ends.map(|v| cells[v as usize] as usize);
+                if c == d {
+                    let [v, w] = ends.map(|v| places[v as usize] - partition.cells[c].start as u32);
+                    outer[c].push([v.min(w), v.max(w)]);
+                }
+            }
         }
-        Self { partition, places, faces, starts, straddling, is_shared, obstacles }
+        outer.iter_mut().for_each(|edges| edges.sort_unstable());
+        Self { partition, places, faces, starts, is_shared, obstacles, outer }
     }
 
     fn vertices(&self, c: usize) -> &[u32] {
@@ -90,18 +98,19 @@ impl Parted {
         let quadrics = vertices.iter().map(|v| net.quadrics[*v as usize]).collect();
         let kind = |v: &u32| if self.is_shared[*v as usize] { FIXED } else { net.kinds[*v as usize] };
         let kinds = vertices.iter().map(kind).collect();
+        let strict = vertices.iter().map(|v| net.strict[*v as usize]).collect();
         let corners =
             self.faces(c).iter().flat_map(|f| net.faces[*f as usize].map(|v| self.places[v as usize] - start)).collect();
-        Patch::new(points, quadrics, kinds, corners)
+        Patch::new(points, quadrics, [kinds, strict], corners)
     }
 
     fn work(&self, net: &Net, c: usize, rules: Rules, is_guarded: bool) -> Work {
-        let triangle = |f: &u32| -> ([u32; 3], Triangle) {
+        let triangle = |f: &u32| -> Obstacle {
             let face = net.faces[*f as usize];
             (face, face.map(|v| net.points[v as usize]))
         };
         let obstacles = self.obstacles[c].iter().map(triangle).collect();
-        Work::new(self.patch(net, c), self.partition.cells[c], obstacles, rules, is_guarded)
+        Work::new(self.patch(net, c), self.partition.cells[c], (obstacles, self.outer[c].clone()), rules, is_guarded)
     }
 }
 
@@ -114,19 +123,22 @@ pub(super) struct Goal {
     pub(super) margin: f64,
 }
 
-/// Simplifies by one round. Returns what each vertex has become, by number in the new mesh, and how many cells had to be done again with a guard.
-pub(super) fn round(net: &mut Net, rules: Rules, parting: Parting, goal: Goal) -> (Vec<u32>, usize) {
+/// What has come of a round.
+pub(super) struct Round {
+    /// What each vertex has become, by number in the new mesh.
+    pub(super) became: Vec<u32>,
+    /// Cells that had to be done again with a guard.
+    pub(super) redone: usize,
+    /// Edges were left alone because of what their quadrics would be.
+    pub(super) is_limited: bool,
+}
+
+/// Simplifies by one round.
+pub(super) fn round(net: &mut Net, rules: Rules, parting: Parting, goal: Goal) -> Round {
     let parted = Parted::new(net, parting);
     let cells = parted.partition.cells.len();
     let mut works: Vec<Work> = (0..cells).into_par_iter().with_max_len(1).map(|c| parted.work(net, c, rules, false)).collect();
-    let (own, straddling) = (parted.faces.len(), parted.straddling);
-    let wanted = if straddling == 0 {
-        goal.triangles
-    } else {
-        let share = own as f64 / (own + straddling) as f64;
-        ((goal.triangles as f64 * share * goal.margin) as usize).max(goal.triangles.saturating_sub(straddling))
-    };
-    advance(&mut works, wanted);
+    advance(&mut works, wanted(net, &parted, goal));
     let redone: Vec<bool> = works
         .par_iter_mut()
         .enumerate()
@@ -142,8 +154,23 @@ pub(super) fn round(net: &mut Net, rules: Rules, parting: Parting, goal: Goal) -
             is_crossed
         })
         .collect();
+    let is_limited = works.iter().any(|work| work.is_limited);
     let became = merge(net, &parted, works);
-    (became, redone.into_iter().filter(|was| *was).count())
+    Round { became, redone: redone.into_iter().filter(|was| *was).count(), is_limited }
+}
+
+/// How many triangles of single cells are to be left. Those whose vertices all stay are not counted on.
+fn wanted(net: &Net, parted: &Parted, goal: Goal) -> usize {
+    let stays = |f: usize| net.faces[f].iter().all(|v| net.kinds[*v as usize] == FIXED);
+    let staying = parted.faces.iter().filter(|f| stays(**f as usize)).count();
+    let staying_in_all = (0..net.faces.len()).into_par_iter().filter(|f| stays(*f)).count();
+    let (own, all) = (parted.faces.len() - staying, net.faces.len() - staying_in_all);
+    let left = goal.triangles.saturating_sub(staying_in_all);
+    if own == 0 || own == all {
+        return staying + left;
+    }
+    let share = own as f64 / all as f64;
+    staying + ((left as f64 * share * goal.margin) as usize).max(left.saturating_sub(all - own))
 }
 
 /// Advances all cells, at about the same cost, until so many triangles are left in them.
@@ -164,10 +191,9 @@ fn advance(works: &mut [Work], wanted: usize) {
             *all.select_nth_unstable_by(rank, f32::total_cmp).1
         };
         let shares: Vec<usize> = samples.iter().map(|own| own.iter().filter(|cost| **cost <= most).count()).collect();
-        let sum: usize = shares.iter().sum();
-        works.par_iter_mut().with_max_len(1).zip(shares).for_each(|(work, share)| {
-            let removed = if sum == 0 { 0 } else { (excess as u128 * share as u128 / sum as u128) as usize };
-            let least = if wanted == 0 { 0 } else { work.patch.live.saturating_sub(removed) };
+        let collapses = in_parts(excess.div_ceil(2), &shares);
+        works.par_iter_mut().with_max_len(1).zip(collapses).for_each(|(work, collapses)| {
+            let least = if wanted == 0 { 0 } else { work.patch.live.saturating_sub(2 * collapses) };
             work.advance(most, least);
         });
         let left: usize = works.iter().map(|work| work.patch.live).sum();
@@ -175,6 +201,18 @@ fn advance(works: &mut [Work], wanted: usize) {
             return;
         }
     }
+}
+
+/// A number in parts of such shares; their sum is the number, if there is any share.
+fn in_parts(number: usize, shares: &[usize]) -> Vec<usize> {
+    let sum = shares.iter().sum::<usize>().max(1) as u128;
+    let mut before = 0;
+    let up_to = |share: usize| (number as u128 * share as u128 / sum) as usize;
+    let part = |share: &usize| {
+        before += share;
+        up_to(before) - up_to(before - share)
+    };
+    shares.iter().map(part).collect()
 }
 
 /// Makes one mesh of all cells and what they share, in the old order. Returns what each old vertex has become.
@@ -193,6 +231,7 @@ fn merge(net: &mut Net, parted: &Parted, works: Vec<Work>) -> Vec<u32> {
             became[*v as usize] = vertices[at as usize];
             net.points[*v as usize] = patch.points[i];
             net.quadrics[*v as usize] = patch.quadrics[i];
+            net.strict[*v as usize] = patch.strict[i];
         }
         for (corners, f) in patch.corners.chunks_exact(3).zip(parted.faces(c)) {
             is_gone[*f as usize] = corners[0] == NONE;
@@ -215,6 +254,7 @@ fn compact(net: &mut Net, became: &mut [u32], is_gone: &[bool]) {
             net.points[count] = net.points[v];
             net.quadrics[count] = net.quadrics[v];
             net.kinds[count] = net.kinds[v];
+            net.strict[count] = net.strict[v];
             net.homes[count] = net.homes[v];
             count += 1;
         }
@@ -222,6 +262,7 @@ fn compact(net: &mut Net, became: &mut [u32], is_gone: &[bool]) {
     net.points.truncate(count);
     net.quadrics.truncate(count);
     net.kinds.truncate(count);
+    net.strict.truncate(count);
     net.homes.truncate(count);
     let mut left = 0;
     for f in (0..net.faces.len()).filter(|f| !is_gone[*f]) {
@@ -232,4 +273,15 @@ fn compact(net: &mut Net, became: &mut [u32], is_gone: &[bool]) {
     net.faces.truncate(left);
     net.origins.truncate(left);
     became.iter_mut().for_each(|v| *v = numbers[*v as usize]);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn parts_make_the_whole() {
+        assert_eq!(in_parts(7, &[1, 0, 1, 1]), [2, 0, 2, 3]);
+        assert_eq!(in_parts(7, &[0, 0]), [0, 0]);
+    }
 }

@@ -152,8 +152,13 @@ mod tests {
         let [before, after] =
             [&points, &smoothed.settled.points].map(|all| all.iter().map(height).sum::<f64>() / all.len() as f64);
         assert!(after < 0.4 * before, "{before} {after}");
+        // The filter makes the tube's own roundness larger by a little: of the six neighbours, two stand beside a vertex, and four a step of the 24 around.
+        let k = 4.0 / 6.0 * (1.0 - (std::f64::consts::TAU / 24.0).cos());
+        let wider = options().filter.transfer(k).powi(8 * 2);
+        // Ripples of height a on a radius r hold a²∕2r² of the volume, which goes with them: 0.1 of 2.
         let [was, is] = smoothed.volume;
-        assert!(((is - was) / was).abs() < 0.02 && smoothed.share == 1.0 && smoothed.settled.held == 0);
+        assert!((is / was - wider).abs() < 2.0 * 0.1_f64.powi(2) / (2.0 * 2.0_f64.powi(2)), "{} {wider}", is / was);
+        assert!(smoothed.share == 1.0 && smoothed.settled.held == 0);
         assert!(smoothed.settled.largest <= 0.2, "not more than from crest to trough");
     }
 

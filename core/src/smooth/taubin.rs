@@ -23,8 +23,8 @@ impl Default for Filter {
     }
 }
 
-/// Of the frequency of waves that are to go, the band that is kept: what is between is made larger, at most by ln(1 ∕ share) · 0.0028 of its height, for N passes that
-/// leave a share of the waves multiply it by (1 + λ²b²∕4)ᴺ, with b the band.
+/// Of the frequency of waves that are to go, the band that is kept. Longer waves are made larger: N passes that leave a share of the waves multiply them by
+/// (1 + λ²b²∕4)ᴺ at most, with b the band, which is about 1 − ln(share) · 0.0028.
 const BAND: f64 = 0.1;
 
 impl Filter {

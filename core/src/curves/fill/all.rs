@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use super::entry::{FillError, Filled, fill};
 use super::nest;
 use super::options::{Options, Outline};
+use super::sense;
 use crate::curves::curve::{Shape, widen};
 use crate::curves::loops::{self, Loops};
 use crate::curves::vector::{Point, distance, dot};
@@ -119,7 +120,10 @@ pub fn fill_network(
     let faces: Vec<Outline> = network.faces.iter().filter(|face| !face.outer.is_empty()).map(Outline::from).collect();
     if from_faces && !faces.is_empty() {
         let shapes: Vec<&Shape> = network.curves.iter().map(|curve| &curve.shape).collect();
-        let faces = with_outer_loops_first(&shapes, faces);
+        let mut faces = with_outer_loops_first(&shapes, faces);
+        for uses in faces.iter_mut().flat_map(|face| std::iter::once(&mut face.outer).chain(&mut face.inner)) {
+            sense::turn(&shapes, uses, NEAR);
+        }
         let outlines = with_shared_curves(&shapes, faces, &loops::find(network, how).doubles);
         let filled = fill(&shapes, &outlines, options)?;
         return Ok(FilledNetwork { loops: None, outlines, filled });

@@ -22,6 +22,9 @@ pub(super) struct Curves {
 
 /// How far sides of a surface of revolution may be from those wanted, in parts of the distance of corners.
 const ALIKE: f64 = 0.1;
+/// Parameters each way at which a surface is looked at for folds: even cells at least, and values at most.
+const LEAST: u32 = 8;
+const MOST: usize = 64;
 
 /// A Coons surface of two, three or four corners, and the lengths of its sides.
 pub(super) fn coons(curves: &Curves, corners: &[usize]) -> Result<(Coons, Vec<f64>), FitError> {
@@ -58,6 +61,25 @@ pub(super) fn laid(coons: Coons, lengths: &[f64], ring: &[Rim]) -> Layout {
     };
     let rings = vec![ring.iter().map(place).collect()];
     oriented(Chart::Coons(Box::new(coons), form), rings, Vec::new())
+}
+
+/// Whether a Coons surface folds, on a grid between the points of its outline, so that what its curves do is not missed: 8 to 64
+/// parameters each way.
+pub(super) fn is_coons_folded(coons: &Coons, ring: &[Rim]) -> bool {
+    let mut cuts = [0, 1].map(|_| (0..=LEAST).map(|at| f64::from(at) / f64::from(LEAST)).collect::<Vec<f64>>());
+    for rim in ring {
+        let (side, low, high) = coons.spans.get(rim.part as usize).copied().unwrap_or_default();
+        let [u, v] = coons.parameters(side, low + (high - low) * rim.share);
+        let (axis, t) = if v == 0.0 || v == 1.0 { (0, u) } else { (1, v) };
+        cuts.iter_mut().skip(axis).take(1).for_each(|cuts| cuts.push(t));
+    }
+    let [us, vs] = cuts.map(|mut cuts| {
+        cuts.sort_by(f64::total_cmp);
+        cuts.dedup();
+        let middles: Vec<f64> = cuts.windows(2).map(|pair| 0.5 * (pair[0] + pair[1])).collect();
+        middles.iter().step_by(middles.len().div_ceil(MOST)).copied().collect::<Vec<f64>>()
+    });
+    coons.is_folded_on(&us, &vs)
 }
 
 /// Sides whose ends meet exactly: each corner is where the earlier side ends.

@@ -107,6 +107,8 @@ pub(super) fn round(frame: &Frame, point: Point) -> [f64; 2] {
 
 /// Axes that are looked at, at most.
 const AXES: usize = 12;
+/// Points, about, by which a surface is refused before it is fitted to all of them.
+const FEW: usize = 1024;
 
 /// The plane of an outline, if all its points are on it.
 pub(super) fn plane(probes: &[Point], tolerance: f64) -> Option<Carrier> {
@@ -118,12 +120,23 @@ pub(super) fn plane(probes: &[Point], tolerance: f64) -> Option<Carrier> {
 /// Surfaces that all points of an outline are on, in the order of preference: cylinder, cone, sphere, torus. O(points · axes).
 pub(super) fn recognise(kinds: &[Kind], probes: &[Point], tolerance: f64) -> Vec<Carrier> {
     let axes = axes(kinds, probes, tolerance);
+    let few: Vec<Point> = probes.iter().step_by(probes.len().div_ceil(FEW).max(1)).copied().collect();
+    // A surface within the tolerance of `n` points has a sum of squared distances of no more than n · tolerance², and the one of least
+    // squares has no larger one; so no point is farther from that than tolerance · √n. Spheres and tori are fitted by the algebraic
+    // distance, of which this is true but for terms of the second order.
+    let most = tolerance * (few.len() as f64).sqrt();
+    let fitted = |fit: &dyn Fn(&[Point]) -> Option<Carrier>| -> Option<Carrier> {
+        let rough = fit(&few)?;
+        (few.len() == probes.len())
+            .then_some(rough)
+            .or_else(|| few.iter().all(|point| rough.distance(*point) <= most).then(|| fit(probes))?)
+    };
     let mut found: Vec<Carrier> = Vec::new();
-    found.extend(axes.iter().filter_map(|axis| cylinder(axis, probes)));
+    found.extend(axes.iter().filter_map(|axis| fitted(&|points| cylinder(axis, points))));
     found.extend(parallel(kinds, probes, tolerance));
-    found.extend(axes.iter().filter_map(|axis| cone(axis, probes)));
-    found.extend(sphere(probes));
-    found.extend(axes.iter().filter_map(|axis| torus(axis, probes)));
+    found.extend(axes.iter().filter_map(|axis| fitted(&|points| cone(axis, points))));
+    found.extend(fitted(&sphere));
+    found.extend(axes.iter().filter_map(|axis| fitted(&|points| torus(axis, points))));
     found.retain(|carrier| probes.iter().all(|point| carrier.distance(*point) <= tolerance));
     found
 }

@@ -7,12 +7,14 @@ use super::basis;
 use super::spline::SplineSurface;
 use super::sum::sum;
 use crate::curves::curve::{CurveError, Spline};
-use crate::curves::vector::{Point, add, cross, norm, scale, sub};
+use crate::curves::vector::{Point, add, cross, dot, norm, scale, sub};
 
 /// Control points of a surface, at most.
 const MOST: usize = 1 << 22;
 /// The width of a surface by its length that is rounding alone: of an outline that goes back the way it came.
 const THINNEST: f64 = 1e-12;
+/// Of the longest normal, one below this part has no direction to speak of.
+const FLATTEST: f64 = 1e-9;
 
 /// A bilinearly blended Coons surface: ruled along v, and along u, less the bilinear surface of the four corners. Parameters are
 /// 0 to 1.
@@ -177,16 +179,29 @@ impl Coons {
     }
 
     /// Whether it folds, or is no wider than rounding makes it: where its normal, on a grid of `count` × `count` inner points,
-    /// turns away from the mean normal.
+    /// turns away from the mean normal, or between neighbours by more than a right angle.
     #[must_use]
     pub fn is_folded(&self, count: u32) -> bool {
         let at = |number: u32| (f64::from(number) + 0.5) / f64::from(count);
         let ts: Vec<f64> = (0..count).map(at).collect();
-        let slopes: Vec<[Point; 2]> = self.grid(&ts, &ts).into_iter().flatten().map(|(_, slopes)| slopes).collect();
-        let normals: Vec<Point> = slopes.iter().map(|[du, dv]| cross(*du, *dv)).collect();
+        self.is_folded_on(&ts, &ts)
+    }
+
+    /// The same on any grid of parameters that grow.
+    pub(super) fn is_folded_on(&self, us: &[f64], vs: &[f64]) -> bool {
+        let rows: Vec<Vec<[Point; 2]>> =
+            self.grid(us, vs).into_iter().map(|row| row.into_iter().map(|(_, slopes)| slopes).collect()).collect();
+        let normals: Vec<Point> = rows.iter().flatten().map(|[du, dv]| cross(*du, *dv)).collect();
         let longest = |all: &mut dyn Iterator<Item = &Point>| all.fold(0.0_f64, |most, one| most.max(norm(*one)));
-        let size = longest(&mut slopes.iter().flatten());
-        longest(&mut normals.iter()) <= THINNEST * size * size || super::space::turns_away(&normals)
+        let size = longest(&mut rows.iter().flatten().flatten());
+        let largest = longest(&mut normals.iter());
+        if largest <= THINNEST * size * size || super::space::turns_away(&normals) {
+            return true;
+        }
+        let is_back = |(a, b): (&Point, &Point)| dot(*a, *b) < 0.0 && norm(*a).min(norm(*b)) > FLATTEST * largest;
+        let rows: Vec<&[Point]> = normals.chunks(vs.len().max(1)).collect();
+        rows.iter().any(|row| row.iter().zip(row.iter().skip(1)).any(is_back))
+            || rows.windows(2).any(|pair| pair[0].iter().zip(pair[1]).any(is_back))
     }
 }
 
@@ -277,5 +292,18 @@ mod tests {
         };
         assert!(!Coons::new(&all([0, 1, 2, 3]), Vec::new()).unwrap().is_folded(8));
         assert!(Coons::new(&all([0, 1, 3, 2]), Vec::new()).unwrap().is_folded(8));
+    }
+
+    /// A side of a square with a bump that is higher than the square: the surface folds above it.
+    #[test]
+    fn a_bump_through_the_opposite_side_folds() {
+        let line = |a: Point, b: Point| side(a, b, [0.0; 3], 0.5);
+        let knots = vec![0.0, 0.0, 0.0, 0.0, 0.5, 0.51, 0.52, 1.0, 1.0, 1.0, 1.0];
+        let points = [0.0, 0.16, 0.33, 0.5, 0.66, 0.83, 1.0].map(|x| [x, if x == 0.5 { 1.5 } else { 0.0 }, 0.0]).to_vec();
+        let bottom = Spline::new(3, knots, points, None, None).unwrap();
+        let [b, c, d, a] = [[1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 0.0]];
+        let coons = Coons::new(&[bottom, line(b, c), line(c, d), line(d, a)], Vec::new()).unwrap();
+        let near: Vec<f64> = (1..200).map(|at| f64::from(at) / 200.0).collect();
+        assert!(coons.is_folded_on(&near, &near));
     }
 }

@@ -4,15 +4,18 @@ use rayon::prelude::*;
 
 use super::layout::Corner;
 use super::mesh::Mesh;
-use super::network::{self, Strands};
+use super::network::{self, Divided, Strands};
 use super::options::{Continuity, Options, Outline};
 use super::orient;
-use super::patch::{Patch, Task};
+use super::patch::{Patch, Task, Tried};
 use super::report::{Report, Surface};
 use super::strand::Strand;
 use super::tangent::{self, Beside};
 use crate::curves::curve::{Shape, Spline};
 use crate::curves::vector::Point;
+
+/// Edges of curves may be longer than those within by this factor.
+const COARSER: f64 = 1.3;
 
 /// Filled outlines.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -74,16 +77,45 @@ pub fn fill_beside(
     options: &Options,
 ) -> Result<Filled, FillError> {
     let strands = strands(shapes, outlines)?;
-    let divided = network::divide(&strands, outlines, options);
-    let tasks = outlines.iter().zip(&divided.rings).zip(&divided.wanted);
-    let tasks: Vec<Task<'_>> = tasks
-        .map(|((outline, rings), &(longest, chord))| Task { outline, strands: &strands, rings, options, longest, chord })
-        .collect();
+    let tried: Vec<Tried> = outlines.iter().map(|_| Tried::default()).collect();
+    let mut divided = network::divide(&strands, outlines, options, &[]);
+    if options.size.is_none() {
+        // Curves are divided as finely as their surfaces have to be, else triangles between both would be flat.
+        let dry: Vec<Patch> = tasks((&strands, &tried), outlines, options, &divided, true).par_iter().map(Task::run).collect();
+        let longest: Vec<f64> = dry.iter().map(|patch| COARSER * patch.longest).collect();
+        if network::is_coarser(&divided, &longest) {
+            divided = network::divide(&strands, outlines, options, &longest);
+        }
+    }
+    let tasks = tasks((&strands, &tried), outlines, options, &divided, false);
     let mut patches: Vec<Patch> = tasks.par_iter().map(Task::run).collect();
     if options.continuity == Continuity::Tangent {
         tangent::bend(&tasks, &mut patches, beside);
     }
     collected(divided.points, patches, (strands, outlines))
+}
+
+/// What there is to do for each outline.
+fn tasks<'a>(
+    (strands, tried): (&'a Strands<'a>, &'a [Tried]),
+    outlines: &'a [Outline],
+    options: &'a Options,
+    divided: &'a Divided,
+    is_dry: bool,
+) -> Vec<Task<'a>> {
+    let wanted = divided.rings.iter().zip(&divided.wanted);
+    let all = outlines.iter().zip(tried).zip(wanted);
+    all.map(|((outline, tried), (rings, &(longest, chord)))| Task {
+        outline,
+        strands,
+        rings,
+        options,
+        longest,
+        chord,
+        is_dry,
+        tried,
+    })
+    .collect()
 }
 
 /// All patches as one mesh.

@@ -1,8 +1,7 @@
 //! Triangles made better in space: edges flipped, places moved, edges split.
 
-use super::chart::Chart;
+use super::lifted::Lifted;
 use super::mesh::of_triangle;
-use super::triangles::Flat;
 use crate::curves::vector::{Point, cross, distance, norm, sub};
 
 /// Rounds, at most.
@@ -12,38 +11,27 @@ const FLIPS: u32 = 4;
 /// Triangles below this are made better.
 const WANTED: f64 = 0.5;
 /// Edges of triangles below this may be flipped.
-const FLIPPED: f64 = 0.7;
+const FLIPPED: f64 = 0.5;
 /// Triangles below this are split at last.
 const POOR: f64 = 0.42;
 
-/// Triangles with their points in space.
+/// Triangles with their points in space; neighbours are not kept up.
 #[derive(Debug)]
 pub(super) struct Improved<'a> {
-    pub(super) flat: Flat,
-    /// Of each place.
-    pub(super) points: Vec<Point>,
-    /// So many places at first stay where they are.
-    rim: usize,
-    chart: &'a Chart,
-    is_mirrored: bool,
+    pub(super) lifted: Lifted<'a>,
 }
 
 impl<'a> Improved<'a> {
-    /// Points within by the chart; those of rings are given.
-    pub(super) fn new(flat: Flat, rim: Vec<Point>, chart: &'a Chart, is_mirrored: bool) -> Self {
-        let mut improved = Self { rim: rim.len(), points: rim, flat, chart, is_mirrored };
-        let places = improved.flat.places.get(improved.rim..).unwrap_or_default();
-        let points: Vec<Point> = places.iter().map(|place| improved.place(*place)).collect();
-        improved.points.extend(points);
-        improved
+    pub(super) fn new(lifted: Lifted<'a>) -> Self {
+        Self { lifted }
     }
 
-    fn place(&self, [x, y]: [f64; 2]) -> Point {
-        self.chart.point([if self.is_mirrored { -x } else { x }, y])
+    fn place(&self, place: [f64; 2]) -> Point {
+        self.lifted.lift(place)
     }
 
     fn point(&self, number: u32) -> Point {
-        self.points.get(number as usize).copied().unwrap_or_default()
+        self.lifted.point(number)
     }
 
     fn quality(&self, [a, b, c]: [u32; 3]) -> f64 {
@@ -52,18 +40,17 @@ impl<'a> Improved<'a> {
 
     /// Twice the area of a triangle of places.
     fn area(&self, numbers: [u32; 3]) -> f64 {
-        let [[a, b], [c, d], [e, f]] = numbers.map(|number| self.flat.places.get(number as usize).copied().unwrap_or_default());
-        (c - a) * (f - b) - (d - b) * (e - a)
+        self.lifted.area(numbers)
     }
 
     /// Makes triangles better until none is poor that can be helped, by no more than `most` new places and a quarter of those
     /// that there are. O(triangles · log) a round, at most 5 rounds.
     pub(super) fn run(&mut self, most: usize) {
-        let most = self.points.len() + most.min(self.points.len() / 4 + 4);
+        let most = self.lifted.points.len() + most.min(self.lifted.points.len() / 4 + 4);
         for round in 0..ROUNDS {
             let qualities = self.qualities();
             // After the first round, what is left of those that are not poor is not worth a round.
-            let enough = if round == 0 { WANTED } else { POOR };
+            let enough = POOR;
             if qualities.iter().all(|quality| *quality >= enough) {
                 return;
             }
@@ -79,14 +66,14 @@ impl<'a> Improved<'a> {
 
     /// Edges within of triangles that are below a quality, each with its triangles and the places of its opposite corners there.
     fn edges(&self, qualities: &[f64], below: f64) -> Vec<[(usize, usize); 2]> {
-        let mut is_near = vec![false; self.points.len()];
-        for (triangle, quality) in self.flat.triangles.iter().zip(qualities) {
+        let mut is_near = vec![false; self.lifted.points.len()];
+        for (triangle, quality) in self.lifted.flat.triangles.iter().zip(qualities) {
             if *quality < below {
                 triangle.iter().for_each(|corner| is_near[*corner as usize] = true);
             }
         }
         let mut halves = Vec::new();
-        for (number, triangle) in self.flat.triangles.iter().enumerate() {
+        for (number, triangle) in self.lifted.flat.triangles.iter().enumerate() {
             for (corner, [a, b]) in [[1, 2], [2, 0], [0, 1]].into_iter().enumerate() {
                 let (a, b) = (triangle[a], triangle[b]);
                 if is_near[a as usize] && is_near[b as usize] {
@@ -101,12 +88,12 @@ impl<'a> Improved<'a> {
     }
 
     fn qualities(&self) -> Vec<f64> {
-        self.flat.triangles.iter().map(|triangle| self.quality(*triangle)).collect()
+        self.lifted.flat.triangles.iter().map(|triangle| self.quality(*triangle)).collect()
     }
 
     /// The corners around an edge: its left opposite one, its start, its right opposite one, its end.
     fn around(&self, [(first, corner), (second, other)]: [(usize, usize); 2]) -> Option<[u32; 4]> {
-        let (left, right) = (self.flat.triangles.get(first)?, self.flat.triangles.get(second)?);
+        let (left, right) = (self.lifted.flat.triangles.get(first)?, self.lifted.flat.triangles.get(second)?);
         Some([left[corner], left[(corner + 1) % 3], right[other], left[(corner + 2) % 3]])
     }
 
@@ -114,7 +101,7 @@ impl<'a> Improved<'a> {
     fn flip(&mut self, mut qualities: Vec<f64>) -> bool {
         let mut is_any = false;
         for _ in 0..FLIPS {
-            let mut touched = vec![false; self.flat.triangles.len()];
+            let mut touched = vec![false; self.lifted.flat.triangles.len()];
             let mut is_changed = false;
             for edge in self.edges(&qualities, FLIPPED) {
                 let [(first, _), (second, _)] = edge;
@@ -132,7 +119,7 @@ impl<'a> Improved<'a> {
                     && pair.iter().all(|one| self.area(*one) > floor)
                     && self.keeps_side([p, a, q, b])
                 {
-                    (self.flat.triangles[first], self.flat.triangles[second]) = (pair[0], pair[1]);
+                    (self.lifted.flat.triangles[first], self.lifted.flat.triangles[second]) = (pair[0], pair[1]);
                     (qualities[first], qualities[second]) = (both[0], both[1]);
                     (touched[first], touched[second]) = (true, true);
                     is_changed = true;
@@ -156,17 +143,17 @@ impl<'a> Improved<'a> {
 
     /// Places within that a triangle below what is wanted has, each with all of its triangles.
     fn stars(&self) -> Vec<(usize, Vec<usize>)> {
-        let mut numbers = vec![usize::MAX; self.points.len()];
-        for triangle in self.flat.triangles.iter().filter(|triangle| self.quality(**triangle) < WANTED) {
+        let mut numbers = vec![usize::MAX; self.lifted.points.len()];
+        for triangle in self.lifted.flat.triangles.iter().filter(|triangle| self.quality(**triangle) < WANTED) {
             triangle.iter().for_each(|corner| numbers[*corner as usize] = 0);
         }
         let mut stars = Vec::new();
-        for (place, number) in numbers.iter_mut().enumerate().skip(self.rim).filter(|(_, number)| **number == 0) {
+        for (place, number) in numbers.iter_mut().enumerate().skip(self.lifted.rim).filter(|(_, number)| **number == 0) {
             *number = stars.len();
             stars.push((place, Vec::new()));
         }
-        for (number, triangle) in self.flat.triangles.iter().enumerate() {
-            for corner in triangle.iter().filter(|corner| **corner as usize >= self.rim) {
+        for (number, triangle) in self.lifted.flat.triangles.iter().enumerate() {
+            for corner in triangle.iter().filter(|corner| **corner as usize >= self.lifted.rim) {
                 if let Some((_, star)) = stars.get_mut(numbers[*corner as usize]) {
                     star.push(number);
                 }
@@ -177,7 +164,7 @@ impl<'a> Improved<'a> {
 
     fn worst(&self, star: &[usize]) -> f64 {
         star.iter()
-            .filter_map(|number| self.flat.triangles.get(*number))
+            .filter_map(|number| self.lifted.flat.triangles.get(*number))
             .map(|one| self.quality(*one))
             .fold(f64::INFINITY, f64::min)
     }
@@ -191,23 +178,23 @@ impl<'a> Improved<'a> {
                 continue;
             }
             let (mut sum, mut weight) = ([0.0; 2], 0.0);
-            let corners: Vec<[u32; 3]> = star.iter().filter_map(|one| self.flat.triangles.get(*one)).copied().collect();
+            let corners: Vec<[u32; 3]> = star.iter().filter_map(|one| self.lifted.flat.triangles.get(*one)).copied().collect();
             for triangle in &corners {
                 // Triangles count by their size in space.
                 let [a, b, c] = triangle.map(|corner| self.point(corner));
                 let share = norm(cross(sub(b, a), sub(c, a)));
                 weight += share;
                 for corner in triangle {
-                    let [x, y] = self.flat.places[*corner as usize];
+                    let [x, y] = self.lifted.flat.places[*corner as usize];
                     sum = [sum[0] + x * share / 3.0, sum[1] + y * share / 3.0];
                 }
             }
-            let (old, point) = (self.flat.places[number], self.points[number]);
+            let (old, point) = (self.lifted.flat.places[number], self.lifted.points[number]);
             let mut is_better = false;
             for share in [1.0, 0.5, 1.5, 0.2] {
                 let towards = |axis: usize| old[axis] + share * (sum[axis] / weight - old[axis]);
-                self.flat.places[number] = [towards(0), towards(1)];
-                self.points[number] = self.place(self.flat.places[number]);
+                self.lifted.flat.places[number] = [towards(0), towards(1)];
+                self.lifted.points[number] = self.place(self.lifted.flat.places[number]);
                 is_better = corners.iter().all(|one| self.area(*one) > 0.0) && self.worst(&star) > before + 1e-6;
                 if is_better {
                     break;
@@ -216,7 +203,7 @@ impl<'a> Improved<'a> {
             if is_better {
                 is_any = true;
             } else {
-                (self.flat.places[number], self.points[number]) = (old, point);
+                (self.lifted.flat.places[number], self.lifted.points[number]) = (old, point);
             }
         }
         is_any
@@ -224,7 +211,7 @@ impl<'a> Improved<'a> {
 
     /// Splits the longest edge of poor triangles, if it is within, at its middle; whether any was.
     fn split(&mut self, most: usize) -> bool {
-        let mut touched = vec![false; self.flat.triangles.len()];
+        let mut touched = vec![false; self.lifted.flat.triangles.len()];
         let mut is_any = false;
         let qualities = self.qualities();
         for edge in self.edges(&qualities, POOR) {
@@ -234,16 +221,16 @@ impl<'a> Improved<'a> {
             let length = |a: u32, b: u32| distance(self.point(a), self.point(b));
             let is_longest = |c: u32| length(a, b) >= length(b, c).max(length(c, a));
             let is_wanted = (poor[0] && is_longest(p)) || (poor[1] && is_longest(q));
-            if !is_wanted || self.points.len() >= most || touched[first] || touched[second] || p == q {
+            if !is_wanted || self.lifted.points.len() >= most || touched[first] || touched[second] || p == q {
                 continue;
             }
-            let [[x, y], [u, v]] = [a, b].map(|number| self.flat.places[number as usize]);
-            let middle = self.points.len() as u32;
+            let [[x, y], [u, v]] = [a, b].map(|number| self.lifted.flat.places[number as usize]);
+            let middle = self.lifted.points.len() as u32;
             let place = [0.5 * (x + u), 0.5 * (y + v)];
-            self.flat.places.push(place);
-            self.points.push(self.place(place));
-            (self.flat.triangles[first], self.flat.triangles[second]) = ([p, a, middle], [q, b, middle]);
-            self.flat.triangles.extend([[p, middle, b], [q, middle, a]]);
+            self.lifted.flat.places.push(place);
+            self.lifted.points.push(self.place(place));
+            (self.lifted.flat.triangles[first], self.lifted.flat.triangles[second]) = ([p, a, middle], [q, b, middle]);
+            self.lifted.flat.triangles.extend([[p, middle, b], [q, middle, a]]);
             (touched[first], touched[second]) = (true, true);
             is_any = true;
         }
@@ -253,7 +240,9 @@ impl<'a> Improved<'a> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::chart::Chart;
     use super::super::space::Frame;
+    use super::super::triangles::Flat;
     use super::*;
 
     #[test]
@@ -263,16 +252,18 @@ mod tests {
         assert_eq!(of_triangle([0.0; 3], [1.0, 0.0, 0.0], [2.0, 0.0, 0.0]), 0.0);
     }
 
-    /// Two flat triangles over the long diagonal of a rhomb: flipped, they are nearly even.
+    /// Two flat triangles over the long diagonal of a rhomb, 0.2 each: flipped, they are 0.87.
     #[test]
     fn a_rhomb_is_flipped() {
         let chart = Chart::Plane(Frame { origin: [0.0; 3], axes: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]] });
-        let places = vec![[-1.7, 0.0], [0.0, -1.0], [1.7, 0.0], [0.0, 1.0]];
+        let places = vec![[-3.0, 0.0], [0.0, -1.0], [3.0, 0.0], [0.0, 1.0]];
         let rim = places.iter().map(|[x, y]| [*x, *y, 0.0]).collect();
         let flat = Flat { places, triangles: vec![[0, 1, 2], [0, 2, 3]] };
-        let mut improved = Improved::new(flat, rim, &chart, false);
+        let mut lifted = Lifted::new(flat);
+        lifted.raise(rim, &chart, false);
+        let mut improved = Improved::new(lifted);
         improved.run(0);
-        assert!(improved.flat.triangles.iter().all(|one| improved.quality(*one) > 0.95));
-        assert!(improved.flat.triangles.iter().all(|one| improved.area(*one) > 0.0));
+        assert!(improved.lifted.flat.triangles.iter().all(|one| improved.quality(*one) > 0.8));
+        assert!(improved.lifted.flat.triangles.iter().all(|one| improved.area(*one) > 0.0));
     }
 }

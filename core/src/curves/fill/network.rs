@@ -2,12 +2,13 @@
 
 use rayon::prelude::*;
 
+use super::grade;
 use super::layout::Rim;
 use super::options::{Options, Outline};
 use super::space;
 use super::strand::{Limits, Strand};
 use crate::curves::Use;
-use crate::curves::vector::Point;
+use crate::curves::vector::{Point, distance};
 
 /// Curves as outlines need them, by their numbers; `None` of those in no outline.
 pub(super) type Strands<'a> = Vec<Option<Strand<'a>>>;
@@ -26,17 +27,23 @@ pub(super) struct Divided {
 /// Parameters and numbers of the points of a curve.
 type Samples = Vec<(f64, u32)>;
 
-/// Divides curves and gives the rings of outlines. O(points).
-pub(super) fn divide(strands: &Strands<'_>, outlines: &[Outline], options: &Options) -> Divided {
+/// Divides curves, those of an outline no coarser than its entry of `longest`, if there is one, and gives the rings of outlines. O(points ·
+/// log points).
+pub(super) fn divide(strands: &Strands<'_>, outlines: &[Outline], options: &Options, longest: &[f64]) -> Divided {
     let (mut limits, wanted) = limits(strands, outlines, options);
-    let divide = |limits: &[Limits]| -> Vec<Vec<f64>> {
-        let pairs = strands.par_iter().zip(limits);
-        pairs.map(|(strand, limits)| strand.as_ref().map(|strand| strand.samples(limits)).unwrap_or_default()).collect()
-    };
-    let mut samples = divide(&limits);
-    if options.size.is_none() && even(strands, outlines, &samples, &mut limits) {
-        samples = divide(&limits);
+    for (outline, longest) in outlines.iter().zip(longest) {
+        for one in std::iter::once(&outline.outer).chain(&outline.inner).flatten() {
+            limits.iter_mut().skip(one.curve).take(1).for_each(|limit| limit.size = limit.size.min(*longest));
+        }
     }
+    let pairs = strands.par_iter().zip(&limits);
+    let mut samples: grade::Samples =
+        pairs.map(|(strand, limits)| strand.as_ref().map(|strand| strand.samples(limits)).unwrap_or_default()).collect();
+    let rings: Vec<Vec<&[Use]>> = outlines
+        .iter()
+        .map(|outline| std::iter::once(&outline.outer).chain(&outline.inner).map(Vec::as_slice).collect())
+        .collect();
+    grade::graded(strands, &rings, &mut samples);
     let roots = joined(strands.len(), outlines);
     let mut divided = Divided { wanted, ..Divided::default() };
     let mut numbers: Vec<Option<u32>> = vec![None; 2 * strands.len()];
@@ -66,6 +73,14 @@ pub(super) fn divide(strands: &Strands<'_>, outlines: &[Outline], options: &Opti
     divided.rings =
         outlines.par_iter().map(|outline| std::iter::once(&outline.outer).chain(&outline.inner).map(ring).collect()).collect();
     divided
+}
+
+/// Whether any ring has an edge longer than the entry of its outline.
+pub(super) fn is_coarser(divided: &Divided, longest: &[f64]) -> bool {
+    divided.rings.iter().zip(longest).any(|(rings, longest)| {
+        let pairs = rings.iter().flat_map(|ring| ring.iter().zip(ring.iter().cycle().skip(1)));
+        pairs.into_iter().any(|(one, next)| distance(one.point, next.point) > *longest)
+    })
 }
 
 fn ring(uses: &[Use], curves: &[Samples], points: &[Point]) -> Vec<Rim> {
@@ -118,30 +133,6 @@ fn limits(strands: &Strands<'_>, outlines: &[Outline], options: &Options) -> (Ve
         }
     }
     (limits, wanted)
-}
-
-/// Lets edges of an outline be at most twice as long as those of its finest curve, but for 1/64 of each curve; whether any are
-/// finer now.
-fn even(strands: &Strands<'_>, outlines: &[Outline], samples: &[Vec<f64>], limits: &mut [Limits]) -> bool {
-    let edge = |curve: usize| {
-        let length = strands.get(curve).and_then(Option::as_ref).map_or(0.0, |strand| strand.length);
-        (length, length / samples.get(curve).map_or(1, |samples| samples.len().saturating_sub(1).max(1)) as f64)
-    };
-    let mut is_any = false;
-    for outline in outlines {
-        let uses = || std::iter::once(&outline.outer).chain(&outline.inner).flatten();
-        let edges = uses().map(|one| edge(one.curve)).filter(|(length, _)| *length > 0.0);
-        let finest = edges.fold(f64::INFINITY, |least, (_, edge)| least.min(edge));
-        for one in uses() {
-            let (length, now) = edge(one.curve);
-            let size = (2.0 * finest).max(length / 64.0);
-            if let Some(limit) = limits.get_mut(one.curve).filter(|_| now > 1.01 * size) {
-                limit.size = limit.size.min(size);
-                is_any = true;
-            }
-        }
-    }
-    is_any
 }
 
 /// Ends of curves (2 of each, by twice its number) that outlines join, each with the lowest of its kind. Near O(uses).

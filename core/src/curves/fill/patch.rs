@@ -1,5 +1,7 @@
 //! The surface and the mesh of one outline: methods tried in their order of trust.
 
+use std::sync::OnceLock;
+
 use super::blend::{self, Curves};
 use super::carrier::{self, Carrier};
 use super::coons::Coons;
@@ -7,7 +9,9 @@ use super::fans;
 use super::fit::FitError;
 use super::improve::Improved;
 use super::layout::{self, Corner, Layout, Rim};
+use super::lifted::Lifted;
 use super::options::{Options, Outline};
+use super::refine;
 use super::report::{Method, Problem, Report, Surface};
 use super::sides;
 use super::space;
@@ -22,6 +26,9 @@ const GAP: f64 = 3e-5;
 /// Products of points within and on outlines that heights may cost.
 const COSTLIEST: f64 = 1e8;
 
+/// Parameters each way at which a surface is looked at again.
+const FINER: u32 = 64;
+
 /// An outline with all that it needs.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Task<'a> {
@@ -32,6 +39,18 @@ pub(super) struct Task<'a> {
     pub(super) options: &'a Options,
     pub(super) longest: f64,
     pub(super) chord: f64,
+    /// Whether the length of edges that the surface wants is all that is asked for: nothing is meshed then, and no heights are made.
+    pub(super) is_dry: bool,
+    pub(super) tried: &'a Tried,
+}
+
+/// Surfaces of an outline that do not depend on how its curves are divided, made when they are first asked for.
+#[derive(Debug, Default)]
+pub(super) struct Tried {
+    plane: OnceLock<Option<Carrier>>,
+    carriers: OnceLock<Vec<Carrier>>,
+    /// Coons surfaces that do not fold, the lengths of their sides, and whether one of those that were made folds.
+    coons: OnceLock<(Vec<Coons>, Vec<f64>, bool)>,
 }
 
 /// The surface of an outline and its triangles.
@@ -41,9 +60,19 @@ pub(super) struct Patch {
     pub(super) report: Report,
     pub(super) points: Vec<Point>,
     pub(super) triangles: Vec<[Corner; 3]>,
+    /// The longest edge that the surface allows.
+    pub(super) longest: f64,
 }
 
-type Meshed = (Vec<Point>, Vec<[Corner; 3]>);
+/// Points within, triangles, and the longest edge that the surface allows.
+#[derive(Clone, Debug)]
+struct Meshed {
+    points: Vec<Point>,
+    triangles: Vec<[Corner; 3]>,
+    longest: f64,
+    /// Whether triangles beside each other face away from each other.
+    turns_back: bool,
+}
 
 impl<'a> Task<'a> {
     fn uses(&self) -> impl Iterator<Item = (&'a Strand<'a>, Use)> {
@@ -76,17 +105,21 @@ impl<'a> Task<'a> {
             report.problem = Some(Problem::Small);
             return self.fallback(report);
         }
+        if self.is_open(size) {
+            report.problem = Some(Problem::Open);
+            return self.fallback(report);
+        }
         let tolerance = self.options.carrier.unwrap_or(1e-5 * size).max(report.gap.min(GAP * size));
         let patch = self.carrier(&probes, tolerance, &mut report).or_else(|| self.blended(cosines, &corners, &mut report));
         match patch {
-            Some((surface, (points, triangles))) => Patch { surface, report, points, triangles },
+            Some((surface, Meshed { points, triangles, longest, .. })) => Patch { surface, report, points, triangles, longest },
             None => self.fallback(report),
         }
     }
 
     fn fallback(&self, report: Report) -> Patch {
         let rings = self.rings.iter().map(|ring| ring.iter().map(|rim| rim.vertex).collect()).collect();
-        Patch { surface: Surface::Fallback(rings), report, points: Vec::new(), triangles: Vec::new() }
+        Patch { surface: Surface::Fallback(rings), report, points: Vec::new(), triangles: Vec::new(), longest: f64::INFINITY }
     }
 
     fn carrier(&self, probes: &[Point], tolerance: f64, report: &mut Report) -> Option<(Surface, Meshed)> {
@@ -97,20 +130,24 @@ impl<'a> Task<'a> {
             report.error = probes.iter().fold(0.0_f64, |most, point| most.max(carrier.distance(*point)));
             Some((Surface::Carrier(carrier), meshed))
         };
-        if let Some(found) = carrier::plane(probes, tolerance).and_then(|plane| try_one(plane, Method::Plane)) {
+        let plane = self.tried.plane.get_or_init(|| carrier::plane(probes, tolerance));
+        if let Some(found) = plane.and_then(|plane| try_one(plane, Method::Plane)) {
             return Some(found);
         }
         if !self.options.recognises {
             return None;
         }
-        let kinds: Vec<Kind> = self.uses().map(|(strand, _)| strand.kind).collect();
-        carrier::recognise(&kinds, probes, tolerance).into_iter().find_map(|carrier| try_one(carrier, Method::Recognised))
+        let carriers = self.tried.carriers.get_or_init(|| {
+            let kinds: Vec<Kind> = self.uses().map(|(strand, _)| strand.kind).collect();
+            carrier::recognise(&kinds, probes, tolerance)
+        });
+        carriers.iter().find_map(|carrier| try_one(*carrier, Method::Recognised))
     }
 
     /// Coons surfaces, heights, and a centre.
     fn blended(&self, cosines: Vec<f64>, corners: &[usize], report: &mut Report) -> Option<(Surface, Meshed)> {
         if self.rings.len() > 1 {
-            let found = self.heights(report);
+            let found = if self.is_dry { None } else { self.heights(report) };
             report.problem = found.is_none().then_some(Problem::Holes);
             return found;
         }
@@ -125,30 +162,47 @@ impl<'a> Task<'a> {
                 return found;
             }
         };
-        let found = self.coons(&curves, corners, report).or_else(|| self.heights(report));
+        let coons = self.coons(&curves, corners, report);
+        if self.is_dry {
+            return coons;
+        }
+        let found = coons.or_else(|| self.heights(report));
         let found = found.or_else(|| self.centre(&curves, report)).or_else(|| self.fans(report));
         report.problem = found.is_none().then_some(Problem::Folds);
         found
     }
 
     fn coons(&self, curves: &Curves, corners: &[usize], report: &mut Report) -> Option<(Surface, Meshed)> {
-        let (plain, lengths) = blend::coons(curves, corners).ok()?;
-        let based = if self.options.recognises { blend::based(&plain) } else { None };
-        for coons in based.into_iter().chain([plain]) {
-            report.is_folded = coons.is_folded(8);
-            if report.is_folded {
+        let (all, lengths, is_folded) = self.tried.coons.get_or_init(|| self.unfolded(curves, corners).unwrap_or_default());
+        report.is_folded = *is_folded;
+        for coons in all {
+            let layout = blend::laid(coons.clone(), lengths, self.rings.first()?);
+            let Some(meshed) = self.mesh(layout) else { continue };
+            // Triangles that turn back are evidence enough for a closer look.
+            if meshed.turns_back && coons.is_folded(FINER) {
+                report.is_folded = true;
                 continue;
             }
-            let layout = blend::laid(coons.clone(), &lengths, self.rings.first()?);
-            let Some(meshed) = self.mesh(layout) else { continue };
             report.method = match coons.sides {
                 2 => Method::Ruled,
                 3 => Method::Triangle,
                 _ => Method::Coons,
             };
-            return Some((Surface::Coons(Box::new(coons)), meshed));
+            return Some((Surface::Coons(Box::new(coons.clone())), meshed));
         }
         None
+    }
+
+    /// Coons surfaces that do not fold, the one upon a surface of revolution first.
+    fn unfolded(&self, curves: &Curves, corners: &[usize]) -> Option<(Vec<Coons>, Vec<f64>, bool)> {
+        let (plain, lengths) = blend::coons(curves, corners).ok()?;
+        let based = if self.options.recognises { blend::based(&plain) } else { None };
+        let mut all: Vec<Coons> = based.into_iter().chain([plain]).collect();
+        let count = all.len();
+        let ring = self.rings.first()?;
+        all.retain(|coons| !blend::is_coons_folded(coons, ring));
+        let is_folded = all.len() < count;
+        Some((all, lengths, is_folded))
     }
 
     /// The same outline on a Coons surface that has been bent; `None` if that cannot be laid flat.
@@ -158,8 +212,8 @@ impl<'a> Task<'a> {
             let length = self.strands.get(one.curve).and_then(Option::as_ref).map_or(0.0, |strand| strand.length);
             lengths.iter_mut().skip(*side).take(1).for_each(|sum| *sum += length);
         }
-        let (points, triangles) = self.mesh(blend::laid(coons.clone(), &lengths, self.rings.first()?))?;
-        Some(Patch { surface: Surface::Coons(Box::new(coons)), report, points, triangles })
+        let Meshed { points, triangles, longest, .. } = self.mesh(blend::laid(coons.clone(), &lengths, self.rings.first()?))?;
+        Some(Patch { surface: Surface::Coons(Box::new(coons)), report, points, triangles, longest })
     }
 
     fn heights(&self, report: &mut Report) -> Option<(Surface, Meshed)> {
@@ -195,7 +249,7 @@ impl<'a> Task<'a> {
         let ring = self.rings.first()?;
         let parts: Vec<(&Strand<'_>, Use)> = self.uses().collect();
         let centre = fans::centre(&parts);
-        if !self.options.fans || !self.is_star(centre) {
+        if self.is_dry || !self.options.fans || !self.is_star(centre) {
             return None;
         }
         let curves = parts.iter().map(|(strand, one)| fans::curve(strand, one, self.options)).collect::<Option<_>>()?;
@@ -203,10 +257,12 @@ impl<'a> Task<'a> {
         for part in fans::parts(ring, centre) {
             let (layout, rims) = whole.laid(&part);
             let alone = Task { rings: &[rims], ..*self };
-            whole.take(&part, alone.mesh(layout)?);
+            let Meshed { points, triangles, .. } = alone.mesh(layout)?;
+            whole.take(&part, (points, triangles));
         }
         report.method = Method::Fans;
-        Some((Surface::Fans { curves, centre }, (whole.points, whole.triangles)))
+        let meshed = Meshed { points: whole.points, triangles: whole.triangles, longest: f64::INFINITY, turns_back: false };
+        Some((Surface::Fans { curves, centre }, meshed))
     }
 
     fn mesh(&self, layout: Layout) -> Option<Meshed> {
@@ -221,7 +277,10 @@ impl<'a> Task<'a> {
         let places: Vec<Vec<[f64; 2]>> =
             rings.iter().map(|ring| ring.iter().map(|(_, place)| mirrored(*place)).collect()).collect();
         let longest = self.longest.min(chart.longest(self.chord, self.options.angle));
-        let flat = triangles::triangles(&places, longest, most)?;
+        if self.is_dry {
+            return Some(Meshed { points: Vec::new(), triangles: Vec::new(), longest, turns_back: false });
+        }
+        let flat = triangles::triangles(&places)?;
         let corners: Vec<Corner> = rings.iter().flatten().map(|(corner, _)| *corner).collect();
         let known = self.rings.iter().flatten().map(|rim| (rim.vertex, rim.point));
         let mut known: Vec<(u32, Point)> = known.collect();
@@ -234,16 +293,21 @@ impl<'a> Task<'a> {
             Corner::Inner(number) => added.get(*number as usize).copied().unwrap_or_default(),
         };
         let rim = corners.iter().map(point).collect();
-        let mut improved = Improved::new(flat, rim, &chart, is_mirrored);
+        let mut lifted = Lifted::new(flat);
+        refine::refine(&mut lifted, longest, corners.len() + most);
+        lifted.raise(rim, &chart, is_mirrored);
+        refine::refine(&mut lifted, longest, corners.len() + most);
+        let turns_back = lifted.is_folded();
+        let mut improved = Improved::new(lifted);
         improved.run(most);
         let first = added.len() as u32;
         let corner = |number: u32| {
             let within = || Corner::Inner(first + number - corners.len() as u32);
             corners.get(number as usize).copied().unwrap_or_else(within)
         };
-        let triangles = improved.flat.triangles.iter().map(|triangle| triangle.map(corner)).collect();
-        let points = added.iter().chain(improved.points.get(corners.len()..).unwrap_or_default()).copied().collect();
-        Some((points, triangles))
+        let triangles = improved.lifted.flat.triangles.iter().map(|triangle| triangle.map(corner)).collect();
+        let points = added.iter().chain(improved.lifted.points.get(corners.len()..).unwrap_or_default()).copied().collect();
+        Some(Meshed { points, triangles, longest, turns_back })
     }
 
     /// Curves fitted, in the direction of the outer loop, and the largest error.
@@ -297,17 +361,30 @@ impl<'a> Task<'a> {
 
     /// The largest distance of ends that follow each other.
     fn gap(&self) -> f64 {
-        let mut largest = 0.0_f64;
-        for uses in std::iter::once(&self.outline.outer).chain(&self.outline.inner) {
+        self.gaps().fold(0.0, |most, (gap, _)| most.max(gap))
+    }
+
+    /// Whether curves that follow each other do not meet: by more than inaccuracy, and than half of the shorter one's length.
+    fn is_open(&self, size: f64) -> bool {
+        self.gaps().any(|(gap, shorter)| gap > (0.5 * shorter).max(GAP * size))
+    }
+
+    /// Distances of ends that follow each other, each with the length of the shorter curve.
+    fn gaps(&self) -> impl Iterator<Item = (f64, f64)> {
+        let loops = std::iter::once(&self.outline.outer).chain(&self.outline.inner);
+        loops.flat_map(|uses| {
             let ends = |one: &Use| {
-                self.strands.get(one.curve).and_then(Option::as_ref).map(|strand| (strand.shape.ends(), one.is_reversed))
+                let strand = self.strands.get(one.curve).and_then(Option::as_ref)?;
+                let [a, b] = strand.shape.ends();
+                Some((if one.is_reversed { [b, a] } else { [a, b] }, strand.length))
             };
-            let turned = |one: &Use| ends(one).map(|([a, b], is_reversed)| if is_reversed { [b, a] } else { [a, b] });
-            let all: Vec<[Point; 2]> = uses.iter().filter_map(turned).collect();
-            let next = all.iter().cycle().skip(1);
-            largest = all.iter().zip(next).fold(largest, |most, (one, next)| most.max(distance(one[1], next[0])));
-        }
-        largest
+            let all: Vec<([Point; 2], f64)> = uses.iter().filter_map(ends).collect();
+            let pair = |at: usize| {
+                let ((one, length), (next, other)) = (all.get(at)?, all.get((at + 1) % all.len())?);
+                Some((distance(one[1], next[0]), length.min(*other)))
+            };
+            (0..all.len()).filter_map(pair).collect::<Vec<_>>()
+        })
     }
 
     /// Whether its curves are one circle, or circles around one axis alone.

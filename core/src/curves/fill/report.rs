@@ -71,6 +71,9 @@ pub enum Problem {
     /// It has less than three points.
     #[error("less than three points")]
     Small,
+    /// Ends of curves that follow each other are farther apart than half of the shorter one is long.
+    #[error("curves that follow each other do not meet")]
+    Open,
     /// All surfaces that were tried fold, and no plane shows the outline without crossings.
     #[error("every surface folds")]
     Folds,

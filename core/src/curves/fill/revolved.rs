@@ -15,35 +15,22 @@ const SAMPLES: u32 = 8;
 /// Of smaller angles between profiles, their axis would be a guess.
 const LEAST: f64 = 0.05;
 
+/// Control points of a surface of revolution, at most: their number is a product of two sides.
+const MOST: usize = 1 << 22;
+
 /// A surface of revolution whose sides are no farther than a distance from those of a Coons surface, at samples: the first side along
-/// and one across are the same. `None` if there is none. O(control points).
+/// and one across are the same. `None` if there is none, or if it has more than four million control points. O(control points).
 pub(super) fn revolved(coons: &Coons, tolerance: f64) -> Option<SplineSurface> {
     let ways = [false, true].into_iter().filter_map(|is_turned| {
         let (along, across) = if is_turned { (&coons.across, &coons.along) } else { (&coons.along, &coons.across) };
-        let surface = between(along.each_ref(), across.each_ref(), tolerance)?;
-        let surface = if is_turned { transposed(&surface).ok()? } else { surface };
-        let off = off(coons, &surface);
-        (off <= tolerance).then_some((off, surface))
+        let product = Product::between(along.each_ref(), across.each_ref(), tolerance)?;
+        let off = product.off(along.each_ref(), across.each_ref());
+        (off <= tolerance).then_some((off, is_turned, product))
     });
-    ways.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, surface)| surface)
-}
-
-/// The largest distance of sides at samples.
-fn off(coons: &Coons, surface: &SplineSurface) -> f64 {
-    let mut largest = 0.0_f64;
-    for t in (0..=SAMPLES).map(|at| f64::from(at) / f64::from(SAMPLES)) {
-        let on = |side: &Spline| side.point_and_derivative(t).0;
-        let pairs = [
-            (on(&coons.along[0]), [t, 0.0]),
-            (on(&coons.along[1]), [t, 1.0]),
-            (on(&coons.across[0]), [0.0, t]),
-            (on(&coons.across[1]), [1.0, t]),
-        ];
-        for (point, place) in pairs {
-            largest = largest.max(distance(point, surface.jet(place).point));
-        }
-    }
-    largest
+    // The control points are many more than those of the sides, so only the surface that is taken has them made.
+    let (_, is_turned, product) = ways.min_by(|a, b| a.0.total_cmp(&b.0))?;
+    let surface = product.surface()?;
+    if is_turned { transposed(&surface).ok() } else { Some(surface) }
 }
 
 /// The frame about whose z-axis one profile turns into the other.
@@ -75,29 +62,61 @@ fn axis(profiles: [&Spline; 2], tolerance: f64) -> Option<Frame> {
     Some(Frame::around(origin, z))
 }
 
-/// The surface from one profile to the other.
-fn between([a, c]: [&Spline; 2], [d, b]: [&Spline; 2], tolerance: f64) -> Option<SplineSurface> {
-    let frame = axis([d, b], tolerance)?;
-    let flat = |point: &Point| {
-        let [x, y, z] = frame.inside(*point);
-        ([x, y], z)
-    };
-    let ends = [d.points().first()?, d.points().last()?].map(|point| flat(point).0);
-    let [near, far] = ends.map(|[x, y]| x.hypot(y));
-    // The row that is farther from the axis: the other one may be a point on it.
-    let (row, [p, q]) = if near >= far { (a, ends[0]) } else { (c, ends[1]) };
-    let squared = p * p + q * q;
-    if squared <= tolerance * tolerance {
-        return None;
+/// The product of a row and a profile, as complex numbers across an axis.
+struct Product<'a> {
+    frame: Frame,
+    row: &'a Spline,
+    profile: &'a Spline,
+    /// The point of the profile that the row begins at, and its squared distance from the axis.
+    start: [f64; 2],
+    squared: f64,
+}
+
+impl<'a> Product<'a> {
+    /// The surface from one profile to the other.
+    fn between([a, c]: [&'a Spline; 2], [d, b]: [&'a Spline; 2], tolerance: f64) -> Option<Self> {
+        let frame = axis([d, b], tolerance)?;
+        let flat = |point: &Point| {
+            let [x, y, _] = frame.inside(*point);
+            [x, y]
+        };
+        let ends = [flat(d.points().first()?), flat(d.points().last()?)];
+        let [near, far] = ends.map(|[x, y]| x.hypot(y));
+        // The row that is farther from the axis: the other one may be a point on it.
+        let (row, start) = if near >= far { (a, ends[0]) } else { (c, ends[1]) };
+        let squared = start[0] * start[0] + start[1] * start[1];
+        (squared > tolerance * tolerance).then_some(Self { frame, row, profile: d, start, squared })
     }
-    let point = |along: &Point, profile: &Point| {
-        let ([x, y], ([u, v], height)) = (flat(along).0, flat(profile));
+
+    /// The point that belongs to one of the row and one of the profile.
+    fn point(&self, along: Point, profile: Point) -> Point {
+        let ([x, y, _], [u, v, height]) = (self.frame.inside(along), self.frame.inside(profile));
+        let [p, q] = self.start;
         // (u + iv) / (p + iq) · (x + iy)
-        let [re, im] = [(u * p + v * q) / squared, (v * p - u * q) / squared];
-        frame.outside([x * re - y * im, x * im + y * re, height])
-    };
-    let rows = row.points().iter().map(|along| d.points().iter().map(|profile| point(along, profile)).collect()).collect();
-    SplineSurface::new([3, 3], [row.knots().to_vec(), d.knots().to_vec()], rows, None).ok()
+        let [re, im] = [(u * p + v * q) / self.squared, (v * p - u * q) / self.squared];
+        self.frame.outside([x * re - y * im, x * im + y * re, height])
+    }
+
+    /// The largest distance of sides at samples.
+    fn off(&self, along: [&Spline; 2], across: [&Spline; 2]) -> f64 {
+        let on = |side: &Spline, t: f64| side.point_and_derivative(t).0;
+        let own = |u: f64, v: f64| self.point(on(self.row, u), on(self.profile, v));
+        let mut largest = 0.0_f64;
+        for t in (0..=SAMPLES).map(|at| f64::from(at) / f64::from(SAMPLES)) {
+            let pairs = [(along[0], own(t, 0.0)), (along[1], own(t, 1.0)), (across[0], own(0.0, t)), (across[1], own(1.0, t))];
+            largest = pairs.into_iter().fold(largest, |most, (side, point)| most.max(distance(on(side, t), point)));
+        }
+        largest
+    }
+
+    fn surface(&self) -> Option<SplineSurface> {
+        let [row, profile] = [self.row, self.profile].map(Spline::points);
+        if row.len().saturating_mul(profile.len()) > MOST {
+            return None;
+        }
+        let points = row.iter().map(|along| profile.iter().map(|profile| self.point(*along, *profile)).collect()).collect();
+        SplineSurface::new([3, 3], [self.row.knots().to_vec(), self.profile.knots().to_vec()], points, None).ok()
+    }
 }
 
 fn transposed(surface: &SplineSurface) -> Result<SplineSurface, CurveError> {

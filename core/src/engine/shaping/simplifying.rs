@@ -5,7 +5,7 @@ use crate::contract::report::Simplified;
 use crate::contract::settings::Profile;
 use crate::engine::mesh::Mesh;
 use crate::engine::work::Work;
-use crate::simplify::{self, Input, Options};
+use crate::simplify::{self, Ended, Input, Options};
 use crate::util::parallel;
 
 /// How many triangles a profile wants of so many.
@@ -30,15 +30,21 @@ pub(super) fn simplify(mesh: &Mesh, work: Work<'_>) -> Result<Change, String> {
     let outcome = parallel::in_pool(work.limits.threads, || simplify::simplify(&input, &options));
     let outcome = outcome.map_err(|error| error.to_string())?;
     let proved = outcome.proved.unwrap_or_default();
-    let short = wanted.filter(|wanted| outcome.faces.len() > *wanted).map(|wanted| {
-        format!("{wanted} triangles were asked for; with fewer than now, triangles would cross or turn over, an edge of the part would go, or the surface would be too far off")
+    let why_not = wanted.filter(|wanted| outcome.faces.len() > *wanted).map(|wanted| {
+        let why = match outcome.ended {
+            Ended::Edges => "fewer would cross, turn over, or lose an edge of the part",
+            _ if within.is_some() => "fewer would be farther off than allowed",
+            _ => "fewer would be farther off than 1 % of the diagonal",
+        };
+        format!("{wanted} triangles were asked for; {why}")
     });
     let told = Simplified {
         before: mesh.faces().len() as u64,
         after: outcome.faces.len() as u64,
         to_result: proved.forward,
         from_result: proved.backward,
-        why_not: short,
+        volume_change: outcome.volume[1] - outcome.volume[0],
+        why_not,
     };
     let (gone, added) = replaced(mesh, (&outcome.points, &outcome.faces, &outcome.origins));
     Ok(Change { gone, added, told: Told::Simplified(told) })

@@ -11,6 +11,7 @@ mod blend;
 mod body;
 mod carrier;
 mod chart;
+mod chords;
 mod coons;
 mod entry;
 mod fan;

@@ -4,6 +4,7 @@ use std::sync::OnceLock;
 
 use super::blend::{self, Curves};
 use super::carrier::{self, Carrier};
+use super::chords;
 use super::coons::Coons;
 use super::fans;
 use super::fit::FitError;
@@ -300,6 +301,7 @@ impl<'a> Task<'a> {
         let turns_back = lifted.is_folded();
         let mut improved = Improved::new(lifted);
         improved.run(most);
+        chords::divide(&mut improved.lifted, &corners);
         let first = added.len() as u32;
         let corner = |number: u32| {
             let within = || Corner::Inner(first + number - corners.len() as u32);

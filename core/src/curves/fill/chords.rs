@@ -1,0 +1,101 @@
+//! Edges that lie on each other in space, divided.
+//!
+//! A surface of revolution that is cut open has each point of the cut twice on its rim. Edges from both of them to one point are two on the map and one in
+//! space, and triangles between them lie on each other; with a point in the middle of each such edge, they do not.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::layout::Corner;
+use super::lifted::Lifted;
+
+/// A point of the mesh in space: kind and number.
+type Key = (u8, u32);
+/// Edges on the map by their ends, and how many triangles each has.
+type Edges = BTreeMap<(u32, u32), u32>;
+
+/// Divides edges within that are not the only ones between their ends in space. The first points of the mesh are `corners`. O(triangles · log triangles), nothing
+/// where no point is twice on the rim.
+pub(super) fn divide(lifted: &mut Lifted<'_>, corners: &[Corner]) {
+    let mut known = BTreeSet::new();
+    if corners.iter().all(|corner| known.insert(key(corner))) {
+        return;
+    }
+    let place = |number: u32| corners.get(number as usize).map_or((2, number), key);
+    let mut uses: BTreeMap<(Key, Key), Edges> = BTreeMap::new();
+    for (a, b) in lifted.flat.triangles.iter().flat_map(sides) {
+        let (p, q) = (place(a), place(b));
+        *uses.entry((p.min(q), p.max(q))).or_default().entry((a.min(b), a.max(b))).or_default() += 1;
+    }
+    let mut middles: BTreeMap<(u32, u32), u32> = BTreeMap::new();
+    let many = uses.iter().filter(|((p, q), edges)| p == q || edges.len() > 1);
+    // An edge of the rim has one triangle.
+    for (ends, _) in many.flat_map(|(_, edges)| edges).filter(|(_, count)| **count == 2) {
+        let [p, q] = [lifted.place(ends.0), lifted.place(ends.1)];
+        let middle = [0.5 * (p[0] + q[0]), 0.5 * (p[1] + q[1])];
+        middles.insert(*ends, lifted.points.len() as u32);
+        let point = lifted.lift(middle);
+        lifted.points.push(point);
+        lifted.flat.places.push(middle);
+    }
+    let triangles = std::mem::take(&mut lifted.flat.triangles);
+    lifted.flat.triangles = triangles.into_iter().flat_map(|triangle| parts(triangle, &middles)).collect();
+}
+
+fn key(corner: &Corner) -> Key {
+    match corner {
+        Corner::Rim(number) => (0, *number),
+        Corner::Inner(number) => (1, *number),
+    }
+}
+
+fn sides([a, b, c]: &[u32; 3]) -> [(u32, u32); 3] {
+    [(*a, *b), (*b, *c), (*c, *a)]
+}
+
+/// A triangle with its divided sides: one to four of them, turned as it is.
+fn parts(triangle: [u32; 3], middles: &BTreeMap<(u32, u32), u32>) -> Vec<[u32; 3]> {
+    let middle = |(a, b): (u32, u32)| middles.get(&(a.min(b), a.max(b))).copied();
+    let around = sides(&triangle).map(middle);
+    // The polygon of corners and middles, and a fan from its first middle; of three middles, the triangle between them stays.
+    if let [Some(p), Some(q), Some(r)] = around {
+        let [a, b, c] = triangle;
+        return vec![[a, p, r], [p, b, q], [r, q, c], [p, q, r]];
+    }
+    let ring: Vec<u32> = triangle.into_iter().zip(around).flat_map(|(corner, middle)| [Some(corner), middle]).flatten().collect();
+    let Some(first) = around.iter().flatten().next().and_then(|middle| ring.iter().position(|number| number == middle)) else {
+        return vec![triangle];
+    };
+    let at = |step: usize| ring.get((first + step) % ring.len()).copied().unwrap_or_default();
+    (1..ring.len() - 1).map(|step| [at(0), at(step), at(step + 1)]).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn triangles_are_divided_along_their_chords() {
+        let middles: BTreeMap<(u32, u32), u32> = [((0, 1), 10), ((1, 2), 11), ((0, 2), 12)].into();
+        let area = |triangles: &[[u32; 3]]| {
+            let place = |number: u32| match number {
+                0 => [0.0, 0.0],
+                1 => [4.0, 0.0],
+                2 => [0.0, 4.0],
+                10 => [2.0, 0.0],
+                11 => [2.0, 2.0],
+                _ => [0.0, 2.0],
+            };
+            let of = |t: &[u32; 3]| {
+                let [a, b, c]: [[f64; 2]; 3] = t.map(place);
+                0.5 * ((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))
+            };
+            assert!(triangles.iter().all(|triangle| of(triangle) > 0.0), "{triangles:?}");
+            triangles.iter().map(of).sum::<f64>()
+        };
+        for count in 0..=3 {
+            let some: BTreeMap<(u32, u32), u32> = middles.iter().take(count).map(|(ends, middle)| (*ends, *middle)).collect();
+            let made = parts([0, 1, 2], &some);
+            assert_eq!((made.len(), area(&made)), (count + 1, 8.0));
+        }
+    }
+}

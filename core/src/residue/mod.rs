@@ -1,7 +1,7 @@
 //! Tool residue: what a milling tool left between its passes is found from the tool path, and the surface that was meant is given back.
 //!
 //! **In:** a mesh of a simulated workpiece, the moves of the tool, the tools.
-//! **Out:** [`find`]: regions of residue, for each triangle its region, for each vertex its place on the intended surface; [`repair`]: the
+//! **Out:** [`find()`]: regions of residue, for each triangle its region, for each vertex its place on the intended surface; [`repair()`]: the
 //! mesh with those regions moved there; [`hint`]: waves of a patch without a path, for a person to look at.
 //!
 //! The swept volume is the least signed distance from the tool over all cutting moves (`cuts`, `tree`, `sweep`, `profile`); `intended` has

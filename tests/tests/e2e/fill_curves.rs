@@ -101,22 +101,3 @@ fn several_files_are_one_network_and_their_picture_stands_beside_the_result() {
     let refused = place.suture(["fill-curves", "first.json", "last.json", "-o", "new.stl", "--picture", "last.json", "--force"]);
     assert!(refused.expect(2).stderr().contains("ends with .png") && !place.at("new.stl").exists());
 }
-
-/// A cone: its base circle, and the line from there to the apex, along which its surface is cut open; in both halves.
-#[test]
-fn a_cone_with_its_apex_becomes_closed() {
-    let place = Place::new();
-    let quarter = |k: usize| {
-        let on = |k: usize| [[5.0, 0.0, 0.0], [0.0, 5.0, 0.0], [-5.0, 0.0, 0.0], [0.0, -5.0, 0.0]][k % 4];
-        let (a, b) = (on(k), on(k + 1));
-        let corner = [0, 1, 2].map(|axis| a[axis] + b[axis]);
-        json!({ "degree": 2, "knots": [0, 0, 0, 1, 1, 1], "weights": [1.0, std::f64::consts::FRAC_1_SQRT_2, 1.0], "points": [a, corner, b] })
-    };
-    let lines = [[5.0, 0.0, 0.0], [-5.0, 0.0, 0.0]].map(|foot| json!({ "line": [foot, [0.0, 0.0, 12.0]] }));
-    let curves: Vec<Value> = (0..4).map(quarter).chain(lines).collect();
-    place.put("cone.json", json!({ "unit": "mm", "curves": curves }).to_string().as_bytes());
-    let told = told(&place, &["cone.json", "-o", "cone.stl"]);
-    assert_eq!(told["mesh"]["verdict"]["good"].as_bool(), Some(true), "{told}");
-    let volume = std::f64::consts::PI * 25.0 * 12.0 / 3.0;
-    assert!((told["mesh"]["before"]["volume"].as_f64().unwrap() / volume - 1.0).abs() < 0.01, "{told}");
-}

@@ -71,7 +71,10 @@ fn parts(triangle: [u32; 3], middles: &BTreeMap<(u32, u32), u32>) -> Vec<[u32; 3
 
 #[cfg(test)]
 mod tests {
+    use super::super::{Options, Outline, fill};
     use super::*;
+    use crate::curves::Use;
+    use crate::curves::curve::{Arc, Shape};
 
     #[test]
     fn triangles_are_divided_along_their_chords() {
@@ -96,6 +99,25 @@ mod tests {
             let some: BTreeMap<(u32, u32), u32> = middles.iter().take(count).map(|(ends, middle)| (*ends, *middle)).collect();
             let made = parts([0, 1, 2], &some);
             assert_eq!((made.len(), area(&made)), (count + 1, 8.0));
+        }
+    }
+
+    /// A cone that is cut open from its apex to its circle: no two triangles have the same corners, coarse as it is.
+    #[test]
+    fn triangles_at_the_apex_of_a_cone_do_not_lie_on_each_other() {
+        let circle = Arc::new([0.0; 3], [[35.0, 0.0, 0.0], [0.0, 35.0, 0.0]], [0.0, std::f64::consts::TAU]).unwrap();
+        let shapes = [Shape::Arc(circle), Shape::Line([[35.0, 0.0, 0.0], [0.0, 0.0, 100.0]])];
+        let uses = [(0, false), (1, false), (1, true)].map(|(curve, is_reversed)| Use { curve, is_reversed });
+        let outline = Outline { outer: uses.to_vec(), inner: Vec::new() };
+        let shapes: Vec<&Shape> = shapes.iter().collect();
+        for chord in [0.02, 0.2, 2.0] {
+            let options = Options { chord: Some(chord), ..Options::default() };
+            let filled = fill(&shapes, std::slice::from_ref(&outline), &options).unwrap();
+            let mut sets: Vec<[u32; 3]> = filled.mesh.triangles.clone();
+            sets.iter_mut().for_each(|set| set.sort_unstable());
+            sets.sort_unstable();
+            assert!(sets.len() > 10 && sets.windows(2).all(|pair| pair[0] != pair[1]), "{chord}");
+            assert!(sets.iter().all(|[a, b, c]| a != b && b != c), "{chord}");
         }
     }
 }

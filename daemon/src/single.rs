@@ -49,7 +49,7 @@ pub(crate) fn simplify(args: &SimplifyArgs) -> Exit {
             profile.simplify_ratio = args.ratio.unwrap_or(0.0);
             profile.simplify_within_mm = args.max_deviation.unwrap_or(0.0);
         }
-        profile.keep_edges_degrees = args.keep_edges.unwrap_or(profile.keep_edges_degrees);
+        profile.keep_edges_degrees = args.edges.keep_edges.unwrap_or(profile.keep_edges_degrees);
         let is_wanted = profile.simplify_triangles > 0 || profile.simplify_ratio > 0.0 || profile.simplify_within_mm > 0.0;
         let help = "give --triangles, --ratio or --max-deviation, or a profile that says it";
         if is_wanted { Ok(()) } else { Err(format!("nothing says how few triangles are wanted: {help}")) }
@@ -61,7 +61,7 @@ pub(crate) fn smooth(args: &SmoothArgs) -> Exit {
     repair_under(&args.repair, |profile| {
         profile.smooth_waves_below_mm = args.waves_below.unwrap_or(profile.smooth_waves_below_mm);
         profile.smooth_leaves = args.leave.unwrap_or(profile.smooth_leaves);
-        profile.keep_edges_degrees = args.keep_edges.unwrap_or(profile.keep_edges_degrees);
+        profile.keep_edges_degrees = args.edges.keep_edges.unwrap_or(profile.keep_edges_degrees);
         let is_wanted = profile.smooth_waves_below_mm > 0.0;
         let help = "give --waves-below, or a profile that says it";
         if is_wanted { Ok(()) } else { Err(format!("nothing says which waves are to be smoothed: {help}")) }

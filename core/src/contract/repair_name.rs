@@ -73,7 +73,7 @@ pub enum RepairName {
     Wrap,
     /// Features below the sizes that the profile names were removed, and the faces around them continued.
     Defeature,
-    /// What a tool left between its passes was moved onto the surface that was meant.
+    /// Residue of a tool, between its passes, was moved onto the surface that was meant.
     Residue,
     /// Waves shorter than the profile wants them were smoothed.
     Smooth,

@@ -40,7 +40,7 @@ use crate::util::ids::NONE;
 /// The unit of sums of areas, as a share of a face: whole numbers, whose sum does not depend on their order.
 const UNIT: f64 = (1_u64 << 40) as f64;
 
-/// What rounding adds to a distance, as a share of the largest coordinate: a hundred times the error of the few sums of f64 that it is made of.
+/// Rounding adds so much to a distance, as a share of the largest coordinate: a hundred times the error of the few sums of f64 that it is made of.
 const ROUNDING: f64 = 1e-13;
 
 /// A bound may be larger than the distance of the farthest vertex by this share before it is worth a search.
@@ -65,7 +65,7 @@ pub(crate) struct Proved {
     pub searched: usize,
 }
 
-/// What is known of a block of triangles.
+/// Facts of a block of triangles.
 #[derive(Default)]
 struct Found {
     farthest: f64,

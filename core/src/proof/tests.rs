@@ -87,7 +87,7 @@ fn what_is_not_covered_is_found() {
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(100))]
-    /// Whatever the vertices are said to have become, no sampled place is farther than the bound.
+    /// No sampled place is farther than the bound, whatever the vertices are said to have become.
     #[test]
     fn no_place_is_farther_than_the_bound(
         heights in prop::collection::vec(0u8..8, 25),

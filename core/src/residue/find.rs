@@ -19,7 +19,7 @@ const HEIGHT_MOST: f64 = 0.25;
 /// Least height, in tolerances.
 const HEIGHT_LEAST: f64 = 4.0;
 
-/// What is kept of a verdict: 24 bytes.
+/// The part of a verdict that is kept: 24 bytes.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Mark {
     target: [f32; 3],

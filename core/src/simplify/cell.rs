@@ -19,7 +19,7 @@ const STABILITY: f64 = 1e-3;
 /// How many limits there are.
 pub(super) const LIMITS: usize = 3;
 
-/// What holds of all cells.
+/// Rules of all cells.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Rules {
     pub(super) shape: legal::Bounds,
@@ -135,7 +135,7 @@ impl Work {
         Some((best.0.0, best.0.1, best.1))
     }
 
-    /// What the edges cost that are still to be looked at, stale ones among them.
+    /// Costs of the edges that are still to be looked at, stale ones among them.
     pub(super) fn costs(&self) -> impl Iterator<Item = f32> + '_ {
         self.heap.entries().iter().map(|entry| entry.cost)
     }

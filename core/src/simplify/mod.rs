@@ -59,7 +59,7 @@ const ROUNDS_WITHOUT_COUNT: usize = 3;
 /// Times that all is done to keep a deviation, at most.
 const ATTEMPTS: usize = 8;
 
-/// What is to be simplified.
+/// A mesh that is to be simplified.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Input<'a> {
     /// Positions of vertices, finite.
@@ -72,7 +72,7 @@ pub(crate) struct Input<'a> {
     pub fixed: Option<&'a [bool]>,
 }
 
-/// What is wanted.
+/// Wishes.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Options {
     /// Stop at so many triangles.
@@ -221,7 +221,7 @@ fn measured(mut outcome: Outcome, input: &Input<'_>, bounds: &Bounds) -> Outcome
     outcome
 }
 
-/// What is held back, and more of it with each attempt.
+/// Vertices that are held back, and more of them with each attempt.
 struct Held {
     fixed: Vec<bool>,
     /// By which of the limits vertices are judged.

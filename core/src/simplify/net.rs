@@ -7,7 +7,7 @@ use crate::geometry::exact::Point;
 use crate::simplify::patch::{CREASE, FIXED, FREE, RIM};
 use crate::simplify::quadric::Quadric;
 
-/// What a plane across an edge of the rim counts for (Garland & Heckbert, section 6): a vertex has two of them, and six planes of triangles where there is no
+/// The weight of a plane across an edge of the rim (Garland & Heckbert, section 6): a vertex has two of them, and six planes of triangles where there is no
 /// rim, so that the rim keeps its shape as well as the surface does.
 const RIM_WEIGHT: f64 = 3.0;
 
@@ -28,7 +28,7 @@ pub(super) struct Net {
     pub(super) open: Vec<u32>,
 }
 
-/// What the vertices are taken for.
+/// Kinds of vertices.
 pub(super) struct Constraints<'a> {
     /// Vertices that stay as they are.
     pub(super) fixed: &'a [bool],

@@ -8,7 +8,7 @@ use crate::util::ids::NONE;
 
 pub(super) use crate::algorithms::fans::MOST;
 
-/// What may become of a vertex; a higher one is less free.
+/// The freedom of a vertex; a higher number is less of it.
 pub(super) const FREE: u8 = 0;
 /// It lies on a crease, and stays on it.
 pub(super) const CREASE: u8 = 1;

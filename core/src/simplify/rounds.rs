@@ -114,7 +114,7 @@ impl Parted {
     }
 }
 
-/// What a round wants.
+/// The goal of a round.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Goal {
     /// Triangles of the whole mesh.
@@ -123,9 +123,9 @@ pub(super) struct Goal {
     pub(super) margin: f64,
 }
 
-/// What has come of a round.
+/// The outcome of a round.
 pub(super) struct Round {
-    /// What each vertex has become, by number in the new mesh.
+    /// The number in the new mesh that each vertex has become.
     pub(super) became: Vec<u32>,
     /// Cells that had to be done again with a guard.
     pub(super) redone: usize,
@@ -217,7 +217,7 @@ fn in_parts(number: usize, shares: &[usize]) -> Vec<usize> {
 
 /// Makes one mesh of all cells and what they share, in the old order. Returns what each old vertex has become.
 fn merge(net: &mut Net, parted: &Parted, works: Vec<Work>) -> Vec<u32> {
-    // What each vertex has become, by its old number.
+    // The vertex that each one has become, by its old number.
     let mut became: Vec<u32> = (0..net.points.len() as u32).collect();
     let mut is_gone = vec![false; net.faces.len()];
     for (c, work) in works.into_iter().enumerate() {

@@ -107,7 +107,7 @@ fn movable(points: &[Point], faces: &[[u32; 3]], region: Option<&[bool]>, featur
 }
 
 /// The signed volume between the faces and their middle; in one order, whatever the number of threads.
-fn volume(points: &[Point], faces: &[[u32; 3]]) -> f64 {
+pub(crate) fn volume(points: &[Point], faces: &[[u32; 3]]) -> f64 {
     let middle = points.iter().fold(DVec3::ZERO, |sum, p| sum + place(*p)) / points.len().max(1) as f64;
     let of = |face: &[u32; 3]| {
         let [a, b, c] = face.map(|v| place(points[v as usize]) - middle);

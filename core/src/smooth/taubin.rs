@@ -36,7 +36,7 @@ impl Filter {
         Some(Self { lambda: usual.lambda, mu: 1.0 / (band - 1.0 / usual.lambda) })
     }
 
-    /// What a pass multiplies by.
+    /// The factor of a pass.
     pub(crate) fn transfer(&self, k: f64) -> f64 {
         (1.0 - self.lambda * k) * (1.0 - self.mu * k)
     }

@@ -116,6 +116,14 @@ pub(crate) struct DefeatureArgs {
     pub repair: RepairArgs,
 }
 
+/// Edges that stay where a surface is smoothed or simplified.
+#[derive(Args, Debug)]
+pub(crate) struct KeepEdges {
+    /// Keep edges where the surface turns by more degrees [default: 40]
+    #[arg(long, value_name = "DEGREES", value_parser = parse_length)]
+    pub keep_edges: Option<f64>,
+}
+
 #[derive(Args, Debug)]
 pub(crate) struct SimplifyArgs {
     /// So many triangles at most
@@ -127,9 +135,8 @@ pub(crate) struct SimplifyArgs {
     /// The surface stays within this distance, both ways, proved; alone, triangles are made as few as it allows; lengths are in the file's units
     #[arg(long, value_name = "D", value_parser = parse_length)]
     pub max_deviation: Option<f64>,
-    /// Keep edges where the surface turns by more degrees [default: 40]
-    #[arg(long, value_name = "DEGREES", value_parser = parse_length)]
-    pub keep_edges: Option<f64>,
+    #[command(flatten)]
+    pub edges: KeepEdges,
     #[command(flatten)]
     pub repair: RepairArgs,
 }
@@ -142,9 +149,8 @@ pub(crate) struct SmoothArgs {
     /// Leave at most this share of their height [default: 0.1]
     #[arg(long, value_name = "SHARE", value_parser = parse_share)]
     pub leave: Option<f64>,
-    /// Keep edges where the surface turns by more degrees [default: 40]
-    #[arg(long, value_name = "DEGREES", value_parser = parse_length)]
-    pub keep_edges: Option<f64>,
+    #[command(flatten)]
+    pub edges: KeepEdges,
     #[command(flatten)]
     pub repair: RepairArgs,
 }

@@ -42,7 +42,7 @@ pub struct Coons {
 pub struct Base {
     /// Of degree 3 both ways, on 0 to 1.
     pub surface: SplineSurface,
-    /// What is added.
+    /// A surface that is added.
     pub rest: Coons,
 }
 

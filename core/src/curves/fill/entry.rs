@@ -95,7 +95,7 @@ pub fn fill_beside(
     collected(divided.points, patches, (strands, outlines))
 }
 
-/// What there is to do for each outline.
+/// The task of each outline.
 fn tasks<'a>(
     (strands, tried): (&'a Strands<'a>, &'a [Tried]),
     outlines: &'a [Outline],

@@ -188,7 +188,7 @@ mod tests {
             }
             assert!(edges.values().all(|times| *times == 1));
             let open: Vec<(u32, u32)> = edges.keys().copied().filter(|(a, b)| !edges.contains_key(&(*b, *a))).collect();
-            // What is open is the outline. Triangles of its edges and the centre have the area of the mesh, but for what that cuts
+            // The outline alone is open. Triangles of its edges and the centre have the area of the mesh, but for what that cuts
             // off where they are bent, so no two of it overlap.
             let cone: f64 = open.iter().map(|(a, b)| norm(cross(sub(point(*a), *centre), sub(point(*b), *centre)))).sum();
             assert!(whole <= cone * (1.0 + 1e-12) && whole >= 0.97 * cone, "{whole} {cone}");

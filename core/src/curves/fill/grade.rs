@@ -44,7 +44,7 @@ struct Edge {
     part: usize,
 }
 
-/// What is wanted of an edge: lengths at its beginning and its end in the direction of its curve, and where to split it first (the
+/// Wishes for an edge: lengths at its beginning and its end in the direction of its curve, and where to split it first (the
 /// distance from its beginning, negative from its end), if it has to be for a sharp corner.
 #[derive(Clone, Copy, Debug)]
 struct Wish {

@@ -11,7 +11,7 @@ use super::chart::Chart;
 use super::triangles::Flat;
 use crate::curves::vector::{Point, cross, dot, sub};
 
-/// What is beyond an edge of a ring.
+/// No triangle: an edge of a ring has this beyond it.
 pub(super) const NONE: u32 = u32::MAX;
 /// A flip makes the sum of cotangents smaller by at least this share.
 const GAIN: f64 = 1e-9;

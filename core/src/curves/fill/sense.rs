@@ -78,7 +78,7 @@ mod tests {
     }
 
     proptest! {
-        /// Whatever directions are said, the curves of a polygon follow each other afterwards, all one way or all the other.
+        /// The curves of a polygon follow each other afterwards, all one way or all the other, whatever directions are said.
         #[test]
         fn curves_of_a_loop_follow_each_other(said in prop::collection::vec(any::<bool>(), 3..9)) {
             let shapes = polygon(said.len());

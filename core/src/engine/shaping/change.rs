@@ -36,11 +36,20 @@ impl Change {
     }
 }
 
+/// How many vertices of a mesh have other places now.
+pub(super) fn vertices_moved(mesh: &Mesh, places: &[[f32; 3]]) -> u64 {
+    mesh.vertices().iter().zip(places).filter(|(from, to)| from != to).count() as u64
+}
+
+/// Whether a triangle of a mesh has a vertex with another place.
+pub(super) fn is_moved(mesh: &Mesh, places: &[[f32; 3]], face: &[u32; 3]) -> bool {
+    face.iter().any(|vertex| mesh.vertices().get(*vertex as usize) != places.get(*vertex as usize))
+}
+
 /// The triangles of a mesh that other places of its vertices change: their numbers, and their new corners.
 pub(super) fn moved(mesh: &Mesh, places: &[[f32; 3]]) -> (Vec<u32>, Vec<Corners>) {
-    let is_moved = |vertex: &u32| mesh.vertices().get(*vertex as usize) != places.get(*vertex as usize);
     let place = |vertex: u32| places.get(vertex as usize).copied().unwrap_or_default();
-    let changed = (0_u32..).zip(mesh.faces()).filter(|(_, face)| face.iter().any(is_moved));
+    let changed = (0_u32..).zip(mesh.faces()).filter(|(_, face)| is_moved(mesh, places, face));
     changed.map(|(number, face)| (number, face.map(place))).unzip()
 }
 

@@ -5,10 +5,8 @@ use crate::contract::report::{Feature, Features, MOST_LISTED, Report};
 use crate::contract::settings::Profile;
 use crate::defeature::{self, Limits as Below, Removed};
 use crate::engine::mesh::Mesh;
-use crate::engine::work::Work;
-use crate::util::parallel;
 
-/// What the profile wants to be rid of, if anything.
+/// The features that the profile does not want, if there are any such.
 pub(super) fn limits_of(profile: &Profile) -> Option<Below> {
     let limit = |below: f64| (below > 0.0).then_some(below);
     let below = Below {
@@ -17,18 +15,17 @@ pub(super) fn limits_of(profile: &Profile) -> Option<Below> {
         grooves_below: limit(profile.remove_grooves_below_mm),
         bosses_below: limit(profile.remove_bosses_below_mm),
     };
-    (profile.repair && below != Below::default()).then_some(below)
+    (below != Below::default()).then_some(below)
 }
 
 /// The features of a mesh that are to go, or why none can be looked for.
-pub(super) fn find(mesh: &Mesh, below: &Below, work: Work<'_>) -> Result<Change, String> {
-    let removed = parallel::in_pool(work.limits.threads, || defeature::defeature(mesh.vertices(), mesh.faces(), below));
-    let removed = removed.map_err(|error| error.to_string())?;
+pub(super) fn find(mesh: &Mesh, below: &Below) -> Result<Change, String> {
+    let removed = defeature::defeature(mesh.vertices(), mesh.faces(), below).map_err(|error| error.to_string())?;
     let told = Told::Features(told(&removed));
     Ok(Change { gone: removed.removed_triangles, added: removed.added, told })
 }
 
-/// What was found, for the report.
+/// Features that were found, for the report.
 fn told(removed: &Removed) -> Features {
     let is_left = |feature: &&defeature::Feature| matches!(feature.outcome, defeature::Outcome::Left(_));
     let left = removed.features.iter().filter(is_left).count() as u64;

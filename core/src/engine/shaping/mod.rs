@@ -19,6 +19,7 @@ use crate::engine::mesh::Mesh;
 use crate::engine::work::Work;
 use crate::io::record::{self, Record};
 use crate::output::edit::Edit;
+use crate::util::parallel;
 pub(crate) use change::{Change, Told};
 
 /// A step that a profile asks for.
@@ -102,12 +103,12 @@ impl Step {
             Err(error) => return Ok(Err(self.refused(error.to_string()))),
         };
         drop(corners);
-        let found = match self {
-            Self::Features(below) => features::find(&mesh, below, work),
+        let found = parallel::in_pool(work.limits.threads, || match self {
+            Self::Features(below) => features::find(&mesh, below),
             Self::Residue => residue::find(&mesh, work),
             Self::Smooth => smoothing::smooth(&mesh, work),
             Self::Simplify => simplifying::simplify(&mesh, work),
-        };
+        });
         if work.progress.cancelled() {
             return Err(Error::cancelled(path, self.stage()));
         }

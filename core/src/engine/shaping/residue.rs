@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::change::{Change, Told, replaced};
+use super::change::{Change, Told, is_moved, replaced, vertices_moved};
 use crate::contract::report::{MOST_LISTED, Residue, ResidueRegion};
 use crate::engine::mesh::Mesh;
 use crate::engine::work::Work;
@@ -10,7 +10,6 @@ use crate::residue::{self, Corrections, Found, Kind, Repaired};
 use crate::simplify::{self, Input, Options};
 use crate::smooth;
 use crate::toolpath::{self, Program, Tool, project, tools};
-use crate::util::parallel;
 
 /// Regions keep this share of their triangles, where that keeps to the surface.
 const SHARE: f64 = 0.2;
@@ -33,23 +32,19 @@ pub(super) fn find(mesh: &Mesh, work: Work<'_>) -> Result<Change, String> {
         ..Default::default()
     };
     let view = residue::Mesh { points: mesh.vertices(), faces: mesh.faces() };
-    let look = || {
-        let found = residue::find(view, &program.moves, &program.header.tools, &options)?;
-        let repaired = residue::repair(view, &found, &options)?;
-        Ok::<_, residue::Error>((found, repaired))
-    };
-    let looked = parallel::in_pool(work.limits.threads, look);
-    let (found, repaired) = looked.map_err(|error| format!("{}: {error}", settings.toolpath))?;
+    let named = |error: residue::Error| format!("{}: {error}", settings.toolpath);
+    let found = residue::find(view, &program.moves, &program.header.tools, &options).map_err(named)?;
+    let repaired = residue::repair(view, &found, &options).map_err(named)?;
     let mut told = told(&found, &program);
     if told.triangles_before == 0 {
         return Ok(Change { gone: Vec::new(), added: Vec::new(), told: Told::Residue(told) });
     }
-    let settled = parallel::in_pool(work.limits.threads, || smooth::settle(mesh.vertices(), mesh.faces(), &repaired.points));
+    let settled = smooth::settle(mesh.vertices(), mesh.faces(), &repaired.points);
     let fewer = fewer(mesh, (&found, &repaired), &settled.points, work)?;
     let (gone, added) = replaced(mesh, (&fewer.points, &fewer.faces, &fewer.origins));
-    told.moved = mesh.vertices().iter().zip(&settled.points).filter(|(from, to)| from != to).count() as u64;
+    told.moved = vertices_moved(mesh, &settled.points);
     told.displacement = settled.largest;
-    told.volume_change = repaired.volume;
+    told.volume_change = fewer.volume[1] - smooth::volume(mesh.vertices(), mesh.faces());
     let proved = fewer.proved.unwrap_or_default();
     told.deviation = proved.forward.max(proved.backward);
     told.triangles_after = (fewer.faces.len() as u64 + told.triangles_before).saturating_sub(mesh.faces().len() as u64);
@@ -95,12 +90,10 @@ fn fewer(
         ..Options::default()
     };
     let input = Input { points: places, faces: mesh.faces(), region: Some(&region), fixed: Some(&repaired.is_fixed) };
-    let outcome = parallel::in_pool(work.limits.threads, || simplify::simplify(&input, &options));
-    let mut outcome = outcome.map_err(|error| error.to_string())?;
+    let mut outcome = simplify::simplify(&input, &options).map_err(|error| error.to_string())?;
     // A triangle that only moved is a new one, too.
-    let is_moved = |vertex: &u32| mesh.vertices().get(*vertex as usize) != places.get(*vertex as usize);
     for origin in &mut outcome.origins {
-        if mesh.faces().get(*origin as usize).is_some_and(|face| face.iter().any(is_moved)) {
+        if mesh.faces().get(*origin as usize).is_some_and(|face| is_moved(mesh, places, face)) {
             *origin = u32::MAX;
         }
     }

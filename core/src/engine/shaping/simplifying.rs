@@ -6,7 +6,6 @@ use crate::contract::settings::Profile;
 use crate::engine::mesh::Mesh;
 use crate::engine::work::Work;
 use crate::simplify::{self, Ended, Input, Options};
-use crate::util::parallel;
 
 /// How many triangles a profile wants of so many.
 fn wanted(profile: &Profile, triangles: usize) -> Option<usize> {
@@ -27,8 +26,7 @@ pub(super) fn simplify(mesh: &Mesh, work: Work<'_>) -> Result<Change, String> {
         ..Options::default()
     };
     let input = Input { points: mesh.vertices(), faces: mesh.faces(), region: None, fixed: None };
-    let outcome = parallel::in_pool(work.limits.threads, || simplify::simplify(&input, &options));
-    let outcome = outcome.map_err(|error| error.to_string())?;
+    let outcome = simplify::simplify(&input, &options).map_err(|error| error.to_string())?;
     let proved = outcome.proved.unwrap_or_default();
     let why_not = wanted.filter(|wanted| outcome.faces.len() > *wanted).map(|wanted| {
         let why = match outcome.ended {

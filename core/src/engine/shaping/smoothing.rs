@@ -1,11 +1,10 @@
 //! Waves that a profile does not want are smoothed.
 
-use super::change::{Change, Told, moved};
+use super::change::{Change, Told, moved, vertices_moved};
 use crate::contract::report::Smoothed;
 use crate::engine::mesh::Mesh;
 use crate::engine::work::Work;
 use crate::smooth::{self, Filter, Options};
-use crate::util::parallel;
 
 /// Of the volume, a mesh may lose or gain so much by smoothing.
 const VOLUME: f64 = 0.01;
@@ -26,12 +25,11 @@ pub(super) fn smooth(mesh: &Mesh, work: Work<'_>) -> Result<Change, String> {
     }
     let feature_angle = Some(profile.keep_edges_degrees.to_radians());
     let options = Options { filter, passes, feature_angle, max_volume_change: Some(VOLUME) };
-    let smoothed = parallel::in_pool(work.limits.threads, || smooth::smooth(mesh.vertices(), mesh.faces(), None, &options));
+    let smoothed = smooth::smooth(mesh.vertices(), mesh.faces(), None, &options);
     let settled = &smoothed.settled;
-    let moves = mesh.vertices().iter().zip(&settled.points).filter(|(from, to)| from != to).count();
     let told = Smoothed {
         passes: passes as u64,
-        moved: moves as u64,
+        moved: vertices_moved(mesh, &settled.points),
         held: settled.held as u64,
         displacement: settled.largest,
         volume_change: smoothed.volume[1] - smoothed.volume[0],

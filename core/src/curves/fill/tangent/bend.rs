@@ -1,4 +1,4 @@
-//! What is beside the curves of blended surfaces, and these surfaces bent into its tangent planes.
+//! Surfaces beside the curves of blended ones, and these bent into the tangent planes of their neighbours.
 //!
 //! Surfaces with an equation, and faces that are given, are not changed: they give their planes. Two blended surfaces meet in the
 //! planes halfway between those that they have by position alone, so each turns as little as can be. All are bent from what they

@@ -112,7 +112,7 @@ pub(super) struct Held<'a> {
     /// Slopes of these vectors, were they turned evenly from one end to the other.
     pub(super) slopes: [Point; 2],
     normal: &'a (dyn Fn(f64, Point) -> Option<Point> + Sync),
-    /// What is added to normals at both ends.
+    /// Vectors that are added to normals at both ends.
     turns: [Point; 2],
 }
 

@@ -1,4 +1,4 @@
-//! What a surface lacks to have the tangent planes of its neighbours, as a surface of its own.
+//! The difference that a surface lacks to have the tangent planes of its neighbours, as a surface of its own.
 
 use super::super::basis;
 use super::super::spline::{Jet, SplineSurface};
@@ -16,7 +16,7 @@ const NEAR: f64 = 0.01;
 /// Samples of a neighbour's part at which angles are measured.
 const SAMPLES: u32 = 32;
 
-/// What a surface lacks to have the tangent planes of its neighbours, and the numbers of those whose planes it can have: of
+/// The difference that a surface lacks to have the tangent planes of its neighbours, and the numbers of those whose planes it can have: of
 /// others, a side at a corner leaves the plane by more than the angle of this cosine. `None` if it can have none. The surface is
 /// of degree 3 both ways, on 0 to 1. O(control points).
 pub(super) fn lacking(surface: &SplineSurface, known: &[Known<'_>], smooth: f64) -> Option<(SplineSurface, Vec<usize>)> {
@@ -57,7 +57,7 @@ fn twist(sides: &[Side<'_>; 4], held: &[Held<'_>], corner: usize) -> Option<Poin
     (!here.is_empty()).then(|| scale(sum, 1.0 / here.len() as f64))
 }
 
-/// What the vectors across a side lack.
+/// The difference that the vectors across a side lack.
 fn ribbon(side: &Side<'_>, held: &[Held<'_>], twists: &[Option<Point>; 4]) -> Option<Spline> {
     let corner = |end: usize| {
         let corner = Side::corner(side.number, end);

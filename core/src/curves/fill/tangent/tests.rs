@@ -296,7 +296,7 @@ fn planes_that_corners_do_not_allow() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(48))]
 
-    /// Whatever is beside it, a surface keeps its sides, does not fold, and is one B-spline.
+    /// A surface keeps its sides, does not fold, and is one B-spline, whatever is beside it.
     #[test]
     fn sides_stay(normals in prop::array::uniform4(prop::array::uniform3(-1.0..1.0_f64)), turn in -3.0..3.0_f64,
         bumps in prop::array::uniform4(-0.3..0.3_f64), count in 2_usize..5) {

@@ -16,9 +16,8 @@ use std::collections::{BTreeMap, BTreeSet};
 const GONE: u8 = 2;
 const HELD: u8 = 1;
 
-/// In place of the number in the input: of a triangle that was added, and of one of an edit that added more than it removed.
+/// In place of the number in the input: of a triangle that was added.
 const ADDED: u32 = u32::MAX;
-const GROWN: u32 = u32::MAX - 1;
 
 /// The ends of an edge, the lower one first.
 type Ends = [[u64; 3]; 2];
@@ -26,7 +25,7 @@ type Ends = [[u64; 3]; 2];
 /// The mesh as it is after some rounds.
 pub(crate) struct Work {
     pub(crate) mesh: Mesh,
-    /// Numbers in the input; `ADDED` or `GROWN` of what was added.
+    /// Numbers in the input; `ADDED` of what was added.
     origins: Vec<u32>,
     /// Triangles of the input.
     count: usize,
@@ -121,7 +120,7 @@ impl Work {
 
     fn feature(&self, candidate: Candidate, outcome: Outcome) -> Feature {
         let mut triangles: Vec<u32> =
-            candidate.triangles.iter().map(|t| self.origins[*t as usize]).filter(|t| *t < GROWN).collect();
+            candidate.triangles.iter().map(|t| self.origins[*t as usize]).filter(|t| *t != ADDED).collect();
         triangles.sort_unstable();
         let Candidate { kind, centre, axis, size, length, depth, confidence, .. } = candidate;
         Feature { kind, centre, axis, size, length, depth, confidence, triangles, outcome }
@@ -134,15 +133,12 @@ impl Work {
         let old = self.mesh.points.len();
         let mut points = self.mesh.points.clone();
         let (mut added, mut owners, mut joined) = (Vec::new(), Vec::new(), Vec::<(u32, u32)>::new());
-        let mut fresh_origins: Vec<u32> = Vec::new();
         for edit in edits {
             edit.removed.iter().for_each(|t| is_gone[*t as usize] = true);
             let shift = (points.len() - old) as u32;
             points.extend(&edit.fresh);
             added.extend(edit.triangles.iter().map(|t| t.map(|v| if (v as usize) < old { v } else { v + shift })));
             owners.extend(&edit.owners);
-            let origin = if edit.triangles.len() > edit.removed.len() { GROWN } else { ADDED };
-            fresh_origins.resize(owners.len(), origin);
             joined.extend(&edit.joined);
         }
         joined.sort_unstable();
@@ -151,7 +147,7 @@ impl Work {
         let kept: Vec<u32> = (0..is_gone.len() as u32).filter(|t| !is_gone[*t as usize]).collect();
         let mut triangles: Vec<[u32; 3]> = kept.iter().map(|t| self.mesh.triangles[*t as usize]).collect();
         let mut origins: Vec<u32> = kept.iter().map(|t| self.origins[*t as usize]).collect();
-        origins.extend(fresh_origins);
+        origins.resize(kept.len() + owners.len(), ADDED);
         triangles.extend(added);
         weld(&points, &mut triangles, old);
         self.mesh = Mesh::new(points, triangles)?;
@@ -159,9 +155,9 @@ impl Work {
         Ok(segments.carried(&self.mesh, &kept, &owners, &joined))
     }
 
-    /// Makes faces anew that edits left with more triangles than they took: vertices of former rims inside of them go.
+    /// Makes faces anew that go on where features were: vertices of former rims inside of them go.
     pub(crate) fn tidy(&mut self, segments: &Segments) {
-        let grown = self.origins.iter().zip(&segments.of).filter(|(origin, _)| **origin == GROWN).map(|(_, s)| *s);
+        let grown = self.origins.iter().zip(&segments.of).filter(|(origin, _)| **origin == ADDED).map(|(_, s)| *s);
         let mut numbers: Vec<u32> = grown.collect();
         numbers.sort_unstable();
         numbers.dedup();

@@ -2,8 +2,8 @@
 //!
 //! **In:** a closed triangle mesh of a CAD part, and limits.
 //! **Out:** a [`Removed`]: features, numbers of triangles to remove, triangles to add.
-//! **Promise:** triangles that belong to no feature stay as they are to the last bit, but those of flat faces that become
-//! smaller, or that removals left with more triangles than they took; the mesh is closed and manifold again; what cannot be removed well is left, with the reason. The same result for
+//! **Promise:** triangles that belong to no feature stay as they are to the last bit, but those of flat and cylindrical faces
+//! that go on where a feature was, which take fewer then; the mesh is closed and manifold again; what cannot be removed well is left, with the reason. The same result for
 //! any number of threads. O(n log n) for each of at most `ROUNDS` rounds: features inside features go first.
 //!
 //! Based on: attributed adjacency (Joshi, Chang, Computer-Aided Design 20, 1988), and a half-space view of removal: neighbours'

@@ -21,6 +21,8 @@ const COS_TOUCH: f64 = 0.9975;
 const CHAMFER: [f64; 2] = [0.259, 0.966];
 /// Cosine of the largest turn of a strip, 150°: beyond, its faces hardly meet.
 const COS_TURN: f64 = -0.866;
+/// The least area of a fillet's support beside its own: a shaft's end that is rounded over most of its radius leaves little.
+const LEAST_SUPPORT: f64 = 0.15;
 /// Pieces of one network.
 const MOST_PIECES: usize = 2_000;
 
@@ -152,7 +154,7 @@ fn touches(mesh: &Mesh, segments: &Segments, segment: &Segment, sides: &[Vec<u32
         (segment.outward(point), segments.list[supports[k] as usize].outward(point))
     };
     let ((a, p), (b, q)) = (normals(0), normals(1));
-    let large = |k: usize| segments.list[supports[k] as usize].area > 0.3 * segment.area;
+    let large = |k: usize| segments.list[supports[k] as usize].area > LEAST_SUPPORT * segment.area;
     dot(a, p) > COS_TOUCH && dot(b, q) > COS_TOUCH && dot(p, q) > COS_TURN && dot(p, q) < 0.98 && large(0) && large(1)
 }
 

@@ -2,7 +2,7 @@
 //!
 //! Faces that meet in concave or smooth edges hang together; what they form is bounded by convex edges (the attributed
 //! adjacency graph of Joshi and Chang, Computer-Aided Design 20, 1988). A channel has two walls that face each other, and is
-//! nowhere wider than between them.
+//! nowhere wider than between them; or two that lean towards each other, and its width is that of its mouth.
 
 use super::super::feature::{Kind, Limits};
 use super::super::mesh::Mesh;
@@ -15,6 +15,8 @@ use crate::defeature::loops::loops;
 
 /// Cosine of 6°: faces that meet in less are smooth.
 const COS_SMOOTH: f64 = 0.9945;
+/// Cosine of the least angle between the normals of leaning walls, 45°: a V is no wider than 135°.
+const COS_MOUTH: f64 = 0.707;
 /// Segments of a channel.
 const MOST_SEGMENTS: usize = 400;
 
@@ -43,33 +45,67 @@ pub(super) fn is_convex(mesh: &Mesh, segments: &Segments, half: u32) -> bool {
     dot(n, m) < COS_SMOOTH && dot(cross(n, m), sub(b, a)) > 0.0
 }
 
-fn channel(mesh: &Mesh, segments: &Segments, group: &[u32], limits: &Limits) -> Option<Candidate> {
-    let limit = limits.grooves_below?;
-    let parts: Vec<&Segment> = group.iter().map(|s| &segments.list[*s as usize]).collect();
-    let walls: Vec<(&Segment, Point, Point)> = parts
-        .iter()
-        .filter(|s| s.surface.is_plane())
-        .filter_map(|s| s.triangles.first().map(|t| (*s, s.outward(mesh.centroid(*t)), mesh.centroid(*t))))
-        .collect();
-    // The two walls with the largest area that face each other.
+/// A flat wall: its area, the direction out of the part, and a point of it.
+struct Wall {
+    area: f64,
+    normal: Point,
+    point: Point,
+}
+
+/// The largest two walls that face each other in parallel: their normal, and how far they are apart.
+fn facing(walls: &[Wall], limit: f64) -> Option<(Point, f64)> {
     let mut best: Option<(f64, Point, f64)> = None;
-    for (k, (one, n, p)) in walls.iter().enumerate() {
-        for (other, m, q) in walls.iter().skip(k + 1) {
-            let gap = dot(sub(*q, *p), *n);
+    for (k, one) in walls.iter().enumerate() {
+        for other in walls.iter().skip(k + 1) {
+            let gap = dot(sub(other.point, one.point), one.normal);
             let area = one.area.min(other.area);
-            if dot(*n, *m) < -0.9998 && gap > 0.0 && gap < limit && best.is_none_or(|(least, ..)| area > least) {
-                best = Some((area, *n, gap));
+            let is_larger = best.is_none_or(|(least, ..)| area > least);
+            if dot(one.normal, other.normal) < -0.9998 && gap > 0.0 && gap < limit && is_larger {
+                best = Some((area, one.normal, gap));
             }
         }
     }
-    let (_, normal, gap) = best?;
+    best.map(|(_, normal, gap)| (normal, gap))
+}
+
+/// The direction across the largest two walls that lean towards each other, as those of a V do.
+fn leaning(walls: &[Wall]) -> Option<Point> {
+    let mut best: Option<(f64, Point)> = None;
+    for (k, one) in walls.iter().enumerate() {
+        for other in walls.iter().skip(k + 1) {
+            let way = sub(other.point, one.point);
+            let area = one.area.min(other.area);
+            let leans = dot(one.normal, other.normal) < COS_MOUTH && dot(way, one.normal) > 0.0 && dot(way, other.normal) < 0.0;
+            if leans && best.is_none_or(|(least, _)| area > least) {
+                best = Some((area, super::patch::direction(sub(one.normal, other.normal))));
+            }
+        }
+    }
+    best.map(|(_, across)| across)
+}
+
+fn channel(mesh: &Mesh, segments: &Segments, group: &[u32], limits: &Limits) -> Option<Candidate> {
+    let limit = limits.grooves_below?;
+    let parts: Vec<&Segment> = group.iter().map(|s| &segments.list[*s as usize]).collect();
+    let walls: Vec<Wall> = parts
+        .iter()
+        .filter(|s| s.surface.is_plane())
+        .filter_map(|s| {
+            s.triangles.first().map(|t| Wall { area: s.area, normal: s.outward(mesh.centroid(*t)), point: mesh.centroid(*t) })
+        })
+        .collect();
     let mut triangles: Vec<u32> = parts.iter().flat_map(|s| s.triangles.iter().copied()).collect();
     triangles.sort_unstable();
-    let heights = triangles.iter().flat_map(|t| mesh.triangles[*t as usize]).map(|v| dot(normal, mesh.at(v)));
-    let (low, high) = heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)));
-    if high - low > gap + 16.0 * mesh.flatness() {
-        return None;
-    }
+    let width = |normal: Point| {
+        let heights = triangles.iter().flat_map(|t| mesh.triangles[*t as usize]).map(|v| dot(normal, mesh.at(v)));
+        let (low, high) = heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)));
+        high - low
+    };
+    let (normal, gap) = match facing(&walls, limit) {
+        Some((normal, gap)) if width(normal) <= gap + 16.0 * mesh.flatness() => (normal, gap),
+        Some(_) => return None,
+        None => leaning(&walls).map(|across| (across, width(across))).filter(|(_, gap)| *gap < limit)?,
+    };
     let rims = loops(mesh, &triangles, |t| triangles.binary_search(&t).is_ok());
     let is_ring = parts.iter().any(|s| matches!(s.surface, Surface::Cylinder { axis, .. } if dot(axis, normal).abs() > 0.999));
     let kind = if is_ring && rims.len() == 2 { Kind::RingGroove } else { Kind::Groove };

@@ -7,6 +7,7 @@
 mod facets;
 mod fit;
 mod hope;
+mod near;
 mod rounds;
 mod start;
 

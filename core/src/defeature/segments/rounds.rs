@@ -12,7 +12,7 @@ use super::start;
 use std::ops::Range;
 
 /// Cosine of the largest angle between neighbouring facets: 46.5°.
-const COS_SMOOTH: f64 = 0.688;
+pub(super) const COS_SMOOTH: f64 = 0.688;
 /// Cosine of the largest angle between a facet's normal and its surface's: 24.5°.
 const COS_NORMAL: f64 = 0.91;
 /// 1 − cos 23.5°: how far a chord of 47° lies below its arc, in radii.
@@ -32,7 +32,7 @@ const LOOK: u32 = 8_192;
 const LITTLE: usize = 12;
 
 /// Of no region.
-const FREE: u32 = u32::MAX;
+pub(super) const FREE: u32 = u32::MAX;
 
 /// What a search from a facet may find.
 #[derive(Clone, Copy, PartialEq)]
@@ -63,12 +63,12 @@ impl Round {
 
 /// What the search knows.
 pub(super) struct Rounds<'a> {
-    mesh: &'a Mesh,
+    pub(super) mesh: &'a Mesh,
     pub(super) facets: &'a Facets,
     /// The region of each facet.
-    taken: Vec<u32>,
+    pub(super) taken: Vec<u32>,
     /// The axes of the regions.
-    axes: Vec<Option<(Point, Point)>>,
+    pub(super) axes: Vec<Option<(Point, Point)>>,
     stamps: Vec<u32>,
     stamp: u32,
     tolerance: f64,
@@ -167,9 +167,10 @@ impl<'a> Rounds<'a> {
                 offer(&mut best, self.cylinder(seed, *other));
             }
         }
-        // Only a cylinder's facets are all turned as it is.
-        if best.as_ref().is_some_and(|round| round.facets.len() >= LITTLE && round.deviation < 1e-3) {
-            return best;
+        // Only a cylinder's facets are all turned as it is, or those of a strip of a slender torus, whose vertices lie off it.
+        let rounding = 2.0 * self.rounding();
+        if best.as_ref().is_some_and(|b| b.facets.len() >= LITTLE && b.deviation < 1e-3 && b.residual <= rounding) {
+            return best.map(|round| self.corrected(seed, round));
         }
         for (k, one) in near.iter().enumerate().take(4) {
             for other in near.iter().skip(k + 1).take(3) {
@@ -188,6 +189,12 @@ impl<'a> Rounds<'a> {
                 offer(&mut best, self.torus(seed, 60));
             }
             self.failed_tori += usize::from(is_lost);
+            // Triangles of a cylinder that run askew: no two of their normals tell its axis, many do. Their longest sides lead
+            // along the same cylinder, shorter ones to the next one, too.
+            if best.is_none() {
+                let facets = self.around(seed, 12, 2);
+                offer(&mut best, if facets.len() >= 6 { self.turned(seed, &facets) } else { None });
+            }
         }
         best.map(|round| self.corrected(seed, round))
     }
@@ -238,19 +245,8 @@ impl<'a> Rounds<'a> {
         self.grow(start, &seeds, 6)
     }
 
-    fn torus(&mut self, seed: u32, most_seeds: usize) -> Option<Round> {
-        let mut seeds = vec![seed];
-        let mut next = 0;
-        // Flat faces beside the torus are no part of it.
-        let most = 8.0 * self.facets.areas[seed as usize];
-        while seeds.len() < most_seeds && next < seeds.len() {
-            for other in self.neighbours(seeds[next]) {
-                if !seeds.contains(&other) && self.facets.areas[other as usize] <= most {
-                    seeds.push(other);
-                }
-            }
-            next += 1;
-        }
+    fn torus(&mut self, seed: u32, count: usize) -> Option<Round> {
+        let seeds = self.around(seed, count, usize::MAX);
         if seeds.len() < 6 {
             return None;
         }
@@ -275,20 +271,6 @@ impl<'a> Rounds<'a> {
             }
         }
         None
-    }
-
-    /// Axes of regions next to facets, three at most.
-    fn axes_beside(&self, facets: &[u32]) -> Vec<(Point, Point)> {
-        let mut found: Vec<u32> = Vec::new();
-        for triangle in facets.iter().flat_map(|facet| self.facets.triangles(*facet)) {
-            for half in 3 * triangle..3 * triangle + 3 {
-                let region = self.taken[self.facets.of[self.mesh.across(half) as usize] as usize];
-                if region != FREE && found.len() < 3 && !found.contains(&region) {
-                    found.push(region);
-                }
-            }
-        }
-        found.iter().filter_map(|region| self.axes.get(*region as usize).copied().flatten()).collect()
     }
 
     /// Grows and fits in turn until nothing is added. `None` where the seeds do not lie on the surface, or fewer than `least`
@@ -445,36 +427,6 @@ impl<'a> Rounds<'a> {
                     surface.distance(middle).abs() <= SAGITTA * reach(surface, middle, way) + limit
                 })
         })
-    }
-
-    /// Untaken facets across smooth edges, those with the longest common edge first.
-    pub(super) fn neighbours(&self, facet: u32) -> Vec<u32> {
-        let mut near: Vec<(f64, u32)> = Vec::new();
-        for triangle in self.facets.triangles(facet) {
-            for half in 3 * triangle..3 * triangle + 3 {
-                let other = self.facets.of[self.mesh.across(half) as usize];
-                let cosine = dot(self.ray(facet).1, self.ray(other).1);
-                if other == facet || self.taken[other as usize] != FREE || cosine < COS_SMOOTH {
-                    continue;
-                }
-                let length = distance(self.mesh.at(self.mesh.from(half)), self.mesh.at(self.mesh.to(half)));
-                match near.iter_mut().find(|(_, known)| *known == other) {
-                    Some(entry) => entry.0 += length,
-                    None => near.push((length, other)),
-                }
-            }
-        }
-        near.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
-        near.into_iter().map(|(_, other)| other).collect()
-    }
-
-    /// The vertices of facets, each once, in the order of their numbers.
-    pub(super) fn points(&self, facets: &[u32]) -> Vec<Point> {
-        let corners = facets.iter().flat_map(|f| self.facets.triangles(*f)).flat_map(|t| self.mesh.triangles[*t as usize]);
-        let mut vertices: Vec<u32> = corners.collect();
-        vertices.sort_unstable();
-        vertices.dedup();
-        vertices.into_iter().map(|v| self.mesh.at(v)).collect()
     }
 }
 

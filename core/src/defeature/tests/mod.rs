@@ -86,6 +86,8 @@ fn what_lies_along_an_edge_is_filled_up_to_where_faces_meet() {
     let bar = |outline: &[[f64; 2]]| parts::bar(outline, 30.0);
     let groove = [[0.0, 0.0], [20.0, 0.0], [20.0, 10.0], [12.0, 10.0], [12.0, 8.0], [10.0, 8.0], [10.0, 10.0], [0.0, 10.0]];
     check(&bar(&groove), Kind::Groove, 2.0, 6000.0);
+    let notch = [[0.0, 0.0], [20.0, 0.0], [20.0, 10.0], [12.0, 10.0], [11.0, 8.5], [10.0, 10.0], [0.0, 10.0]];
+    check(&bar(&notch), Kind::Groove, 2.0, 6000.0);
     let chamfer = [[0.0, 0.0], [20.0, 0.0], [20.0, 9.0], [19.0, 10.0], [0.0, 10.0]];
     check(&bar(&chamfer), Kind::Chamfer, 2.0_f64.sqrt(), 6000.0);
     let mut convex = vec![[0.0, 0.0], [20.0, 0.0]];
@@ -100,6 +102,40 @@ fn what_lies_along_an_edge_is_filled_up_to_where_faces_meet() {
 }
 
 #[test]
+fn triangles_of_a_fillet_may_run_askew() {
+    // The vertices of both ends are on one cylinder, at other angles: no two triangles lie in a plane.
+    let outline = |power: f64| {
+        let mut outline = vec![[0.0, 0.0], [20.0, 0.0]];
+        let angle = |k: i32| 90.0_f64.to_radians() * (f64::from(k) / 8.0).powf(power);
+        outline.extend((0..=8).map(|k| [18.0 + 2.0 * angle(k).cos(), 8.0 + 2.0 * angle(k).sin()]));
+        outline.push([0.0, 10.0]);
+        outline
+    };
+    check(&parts::lofted(&outline(1.0), &outline(1.15), 30.0), Kind::Fillet, 2.0, 6000.0);
+}
+
+#[test]
+fn the_rounded_end_of_a_shaft_is_a_fillet() {
+    // Narrow strips of the torus are cylinders within the tolerance, its last row is a cone; of the wider one, little of the
+    // shaft's end is left.
+    for (minor, steps, columns) in [(0.9, 16, 64), (3.0, 6, 48)] {
+        let mut profile = vec![[6.0, 0.0]];
+        profile.extend(parts::arc([6.0 - minor, 12.0 - minor], minor, [0.0, 90.0], steps));
+        let part = parts::shaft(&profile, columns);
+        let limits = Limits { fillets_below: Some(4.0), ..Limits::default() };
+        let edit = defeature(&part.points, &part.triangles, &limits).unwrap();
+        let found: Vec<_> = edit.features.iter().map(|f| (f.kind, f.outcome)).collect();
+        assert_eq!(found, [(Kind::Fillet, Outcome::Removed)]);
+        assert!((edit.features[0].size - minor).abs() < 1e-3 * minor, "{}", edit.features[0].size);
+        let left = apply(&part, &edit);
+        assert!(is_closed(&left));
+        let off = |p: &[f32; 3]| f64::from(p[0]).hypot(f64::from(p[1])) - 6.0;
+        assert!(left.iter().flatten().all(|p| off(p).abs() < 1e-5 && (p[2].abs() < 1e-5 || (p[2] - 12.0).abs() < 1e-5)));
+        assert!((volume(&left) / (std::f64::consts::PI * 36.0 * 12.0) - 1.0).abs() < 5e-3, "{}", volume(&left));
+    }
+}
+
+#[test]
 fn nested_features_go_from_within() {
     // A boss of 3 mm with a blind hole of 1 mm in it.
     let part = parts::tower([30.0, 20.0, 5.0], [12.0, 9.0], [(3.0, 2.0), (1.0, -1.0)]);
@@ -111,12 +147,15 @@ fn nested_features_go_from_within() {
 }
 
 #[test]
-fn untouched_triangles_stay_in_the_edit_of_a_hole() {
+fn faces_that_no_feature_touches_stay_as_they_are() {
     let part = parts::plate([30.0, 20.0, 5.0], &[parts::circle([12.0, 9.0], 1.0, 16)]);
     let edit = defeature(&part.points, &part.triangles, &ALL).unwrap();
-    // The wall of 16 quads goes, and nothing else.
-    assert_eq!(edit.removed_triangles.len(), 32);
-    assert_eq!(edit.removed_triangles, edit.features[0].triangles);
+    assert_eq!(edit.features[0].triangles.len(), 32);
+    // The wall of 16 quads goes, and both faces around it become two triangles each; the four sides stay.
+    let height = |t: u32| part.triangles[t as usize].map(|v| part.points[v as usize][2]);
+    let sides = (0..part.triangles.len() as u32).filter(|t| !edit.removed_triangles.contains(t));
+    assert_eq!(sides.inspect(|t| assert_ne!(height(*t)[0] + height(*t)[1] + height(*t)[2], 15.0)).count(), 8);
+    assert_eq!(edit.added.len(), 4);
 }
 
 #[test]
@@ -126,7 +165,9 @@ fn many_holes_hold_most_triangles() {
     let part = parts::plate([30.0, 20.0, 5.0], &places);
     let edit = defeature(&part.points, &part.triangles, &ALL).unwrap();
     assert_eq!(edit.features.len(), 12);
-    assert!(is_closed(&apply(&part, &edit)));
+    let left = apply(&part, &edit);
+    assert!(is_closed(&left));
+    assert_eq!(left.len(), 12);
 }
 
 #[test]

@@ -125,6 +125,41 @@ pub(super) fn bar(outline: &[[f64; 2]], length: f64) -> Part {
     part
 }
 
+/// A bar whose ends have outlines of equally many points.
+pub(super) fn lofted(bottom: &[[f64; 2]], top: &[[f64; 2]], length: f64) -> Part {
+    let mut part = Part::default();
+    part.face(&[bottom.to_vec()], 0.0, false);
+    part.face(&[top.to_vec()], length, true);
+    for k in 0..bottom.len() {
+        let next = (k + 1) % bottom.len();
+        let [a, b] = [k, next].map(|k| [bottom[k][0], bottom[k][1], 0.0]);
+        let [c, d] = [k, next].map(|k| [top[k][0], top[k][1], length]);
+        part.triangle([a, b, d]);
+        part.triangle([a, d, c]);
+    }
+    part
+}
+
+/// A body turned around the z axis: (radius, height) from the foot up, each end closed by a disc.
+pub(super) fn shaft(profile: &[[f64; 2]], columns: usize) -> Part {
+    let ring = |[radius, _]: [f64; 2]| circle([0.0; 2], radius, columns);
+    let mut part = Part::default();
+    let (Some(foot), Some(head)) = (profile.first(), profile.last()) else { return part };
+    part.face(&[ring(*foot)], foot[1], false);
+    part.face(&[ring(*head)], head[1], true);
+    for pair in profile.windows(2) {
+        let (low, high) = (ring(pair[0]), ring(pair[1]));
+        for k in 0..columns {
+            let next = (k + 1) % columns;
+            let [a, b] = [k, next].map(|k| [low[k][0], low[k][1], pair[0][1]]);
+            let [c, d] = [k, next].map(|k| [high[k][0], high[k][1], pair[1][1]]);
+            part.triangle([a, b, d]);
+            part.triangle([a, d, c]);
+        }
+    }
+    part
+}
+
 /// Triangles between outlines: those of the constrained triangulation whose middle lies inside by the even-odd rule.
 fn fill(outlines: &[Outline]) -> Vec<[[f64; 2]; 3]> {
     let mut mesh = ConstrainedDelaunayTriangulation::<Point2<f64>>::new();

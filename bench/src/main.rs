@@ -117,6 +117,17 @@ enum Task {
     },
     /// Measure how fast suture and its peers read and write each format, and publish it.
     Formats(Formats),
+    /// Measure how the cost of filling curves grows with their number, and publish it.
+    Curves {
+        /// Curves of one outline, or loops of four.
+        #[arg(long, value_delimiter = ',', default_value = "100,1000,10000,100000")]
+        sizes: Vec<u64>,
+        /// Runs over every network.
+        #[arg(long, default_value_t = 3)]
+        runs: usize,
+        #[command(flatten)]
+        options: Closing,
+    },
     /// Load one OBJ by tobj, and print the seconds as JSON: a process that `formats` measures.
     #[command(hide = true)]
     LoadObj { file: PathBuf },
@@ -289,6 +300,9 @@ fn main() -> ExitCode {
         Task::Meant { folder, which } => write_meant(&folder, &which),
         Task::Skin { folder, jobs, keep, options } => judge_skins(&folder, jobs, keep, options),
         Task::Formats(choices) => measure_formats(choices),
+        Task::Curves { sizes, runs, options } => {
+            closing(options, "curves", false, |options| compare::outlines::outlines(options, &sizes, runs))
+        }
         Task::LoadObj { file } => load_obj(&file),
         Task::Publish(Publish { results, check: true }) => check(results.as_deref()),
         Task::Publish(choices) => publish(choices.results.as_deref()).map(|()| ExitCode::SUCCESS),

@@ -6,6 +6,7 @@ use suture_bench::generate::Case;
 
 use super::child::Cost;
 use super::error::Error;
+use super::filled::Filled;
 use super::made::{Closed, Shaped, Skinned, Solved, Understood};
 use super::record::{Input, Line, Outcome, Run, Session, read};
 use super::sides::Side;
@@ -54,6 +55,10 @@ impl Chapter {
 
     pub(super) fn skinned(&self) -> impl Iterator<Item = &Skinned> {
         self.lines.iter().filter_map(|line| if let Line::Skinned(skinned) = line { Some(&**skinned) } else { None })
+    }
+
+    pub(super) fn filled(&self) -> impl Iterator<Item = &Filled> {
+        self.lines.iter().filter_map(|line| if let Line::Filled(filled) = line { Some(&**filled) } else { None })
     }
 
     pub(super) fn transfers(&self) -> impl Iterator<Item = &Transfer> {

@@ -11,6 +11,7 @@ use super::page_closing;
 use super::page_damage;
 use super::page_formats;
 use super::page_meaning;
+use super::page_outlines;
 use super::page_skin;
 use super::page_solids;
 use super::record::{Input, Judged, is_good};
@@ -52,6 +53,7 @@ pub(super) fn page(book: &Book, plots: &[(String, String)]) -> String {
     page += &page_solids::solids(book);
     page += &page_arrays::arrays(book);
     page += &page_formats::formats(book);
+    page += &page_outlines::outlines(book);
     for input in book.inputs() {
         page += &of_input(book, input);
     }

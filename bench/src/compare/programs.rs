@@ -78,7 +78,7 @@ impl Programs {
                 command.arg(output);
             }
             Program::Suture => {
-                command = Command::new(self.suture.as_deref().unwrap_or(Path::new("suture")));
+                command = self.suture();
                 command.arg(if facts.writes { "repair" } else { "inspect" });
                 if files == 1 {
                     command.arg(input)
@@ -92,7 +92,7 @@ impl Programs {
                 bound(&mut command, way);
             }
             Program::Convert => {
-                command = Command::new(self.suture.as_deref().unwrap_or(Path::new("suture")));
+                command = self.suture();
                 command.arg("convert").args([input, output]);
                 bound(&mut command, way);
             }
@@ -131,6 +131,11 @@ impl Programs {
         };
         let bytes = std::fs::read(&path).map_err(Error::io(format!("reading {}", path.display())))?;
         Ok(format!("{name} {:.12}", blake3::hash(&bytes).to_hex()))
+    }
+
+    /// Suture, all its arguments still to be given.
+    pub(super) fn suture(&self) -> Command {
+        Command::new(self.suture.as_deref().unwrap_or(Path::new("suture")))
     }
 
     /// A script of `pipelines/`, its arguments still to be given.

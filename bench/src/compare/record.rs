@@ -11,6 +11,7 @@ use suture_bench::judge::{Judgement, Kept};
 
 use super::child::Cost;
 use super::error::Error;
+use super::filled::Filled;
 use super::machine::Machine;
 use super::made::{Closed, Shaped, Skinned, Solved, Understood};
 use super::sides::Side;
@@ -33,6 +34,7 @@ pub(crate) enum Line {
     Understood(Understood),
     Skinned(Box<Skinned>),
     Transfer(Transfer),
+    Filled(Box<Filled>),
     /// Something was left out, and why.
     Skipped {
         side: Side,

@@ -15,8 +15,8 @@ use crate::defeature::loops::loops;
 
 /// Cosine of 6°: faces that meet in less are smooth.
 const COS_SMOOTH: f64 = 0.9945;
-/// Cosine of the least angle between the normals of leaning walls, 45°: a V is no wider than 135°.
-const COS_MOUTH: f64 = 0.707;
+/// Cosine of the least angle between the normals of leaning walls, 20°: a V is no wider than 160°.
+const COS_MOUTH: f64 = 0.94;
 /// Segments of a channel.
 const MOST_SEGMENTS: usize = 400;
 

@@ -71,6 +71,7 @@ fn fill(args: &FillCurvesArgs) -> Result<Done, String> {
     (options.tolerance, options.chord, options.size) = (args.tolerance, args.chord, args.edge);
     options.continuity = if args.tangent { Continuity::Tangent } else { Continuity::Position };
     options.fans = !matches!(kind, Kind::Mesh(_));
+    options.threads = args.spend.threads.map(usize::from);
     options.angle = args.angle.map_or(options.angle, f64::to_radians);
     let filled = fill::fill_network(&network, (!args.loops, &how), &options).map_err(|error| format!("{shown}: {error}"))?;
     if filled.outlines.is_empty() {
@@ -151,7 +152,10 @@ fn write_mesh(
     let mut limits = args.spend.limits(false);
     limits.spool.get_or_insert_with(|| fsx::folder_of(output).to_owned());
     let of = (first(args), &filled.filled, network.unit.millimetres);
-    let mesh = suture_core::write_curve_mesh(of, (&draft.path(), format), &limits, &Quiet).map_err(|error| error.to_string())?;
+    let mut mesh =
+        suture_core::write_curve_mesh(of, (&draft.path(), format), &limits, &Quiet).map_err(|error| error.to_string())?;
+    // The report is of the file by its name, not of the draft.
+    output.clone_into(&mut mesh.report.input.path);
     draft.place_like(first(args), output, args.force).map_err(failed)?;
     Ok(mesh)
 }

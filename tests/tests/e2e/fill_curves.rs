@@ -30,6 +30,7 @@ fn the_edges_of_a_cuboid_become_a_closed_mesh_in_millimetres() {
     for output in ["out.stl", "out.3mf", "out.ply"] {
         let told = told(&place, &["wire.json", "-o", output]);
         let mesh = &told["mesh"];
+        assert!(mesh["input"]["path"].as_str().unwrap().ends_with(output), "{mesh}");
         assert_eq!((mesh["verdict"]["good"].as_bool(), told["outlines"].as_array().unwrap().len()), (Some(true), 6), "{told}");
         assert!((mesh["before"]["volume"].as_f64().unwrap() - 24.0).abs() < 1e-6, "{mesh}");
     }

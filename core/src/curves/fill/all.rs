@@ -117,6 +117,11 @@ pub fn fill_network(
     (from_faces, how): (bool, &loops::Options),
     options: &Options,
 ) -> Result<FilledNetwork, FillError> {
+    options.with_threads(|| all(network, (from_faces, how), options))
+}
+
+/// As [`fill_network`], with the threads that there are.
+fn all(network: &Network, (from_faces, how): (bool, &loops::Options), options: &Options) -> Result<FilledNetwork, FillError> {
     let faces: Vec<Outline> = network.faces.iter().filter(|face| !face.outer.is_empty()).map(Outline::from).collect();
     if from_faces && !faces.is_empty() {
         let shapes: Vec<&Shape> = network.curves.iter().map(|curve| &curve.shape).collect();

@@ -76,6 +76,11 @@ pub fn fill_beside(
     beside: &[Beside<'_>],
     options: &Options,
 ) -> Result<Filled, FillError> {
+    options.with_threads(|| made(shapes, outlines, beside, options))
+}
+
+/// Fills outlines with the threads that there are.
+fn made(shapes: &[&Shape], outlines: &[Outline], beside: &[Beside<'_>], options: &Options) -> Result<Filled, FillError> {
     let strands = strands(shapes, outlines)?;
     let tried: Vec<Tried> = outlines.iter().map(|_| Tried::default()).collect();
     let mut divided = network::divide(&strands, outlines, options, &[]);

@@ -19,6 +19,8 @@ mod fans;
 mod fit;
 mod grade;
 mod improve;
+#[cfg(test)]
+mod known;
 mod layout;
 mod lifted;
 mod linear;

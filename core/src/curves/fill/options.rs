@@ -2,6 +2,7 @@
 
 use crate::curves::loops::Loop;
 use crate::curves::{Face, Use};
+use crate::util::parallel::in_pool;
 
 /// How near fitted curves are where tangent planes are wanted, in lengths: the error of a cubic B-spline's tangent grows as its own
 /// one to the power of 3/4, and 10⁻⁸ makes 10⁻⁶ of it.
@@ -34,6 +35,8 @@ pub struct Options {
     /// Whether an outline that nothing else fits gets a surface for each of its curves, to a centre. Files of surfaces need one; in a mesh, the filling of
     /// holes keeps clear of other faces, and such a cone may not.
     pub fans: bool,
+    /// Threads that work, `None`: those of the caller's pool. The result is the same.
+    pub threads: Option<usize>,
 }
 
 /// How a surface that is blended from its curves meets its neighbours.
@@ -62,11 +65,20 @@ impl Default for Options {
             inner: 100_000,
             continuity: Continuity::Position,
             fans: true,
+            threads: None,
         }
     }
 }
 
 impl Options {
+    /// Does work with as many threads as are wanted.
+    pub(super) fn with_threads<R: Send>(&self, work: impl FnOnce() -> R + Send) -> R {
+        match self.threads {
+            Some(threads) => in_pool(threads, work),
+            None => work(),
+        }
+    }
+
     /// How far the fitted curve of one of a length may be from it; `None` where nothing is said.
     pub(super) fn fit(&self, length: f64) -> Option<f64> {
         let near = (self.continuity == Continuity::Tangent).then_some(NEAR * length);

@@ -10,12 +10,12 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use crossbeam::channel::Sender;
-use suture_core::report::Task;
-use suture_core::{ErrorClass, Limits, Profile, Report};
+use suture_core::{ErrorClass, Profile, Report};
 use suture_store::Lease;
 use suture_store::job::{Duty, Kind, Withdrawal};
 use suture_store::{Claim, Job, JobId, JobStore, State, Step, StoreError, crash_point};
 
+use crate::beside;
 use crate::carry::is_carried;
 use crate::choice;
 use crate::claim::{CLAIMED, Claimed, Unclaimed, claim, let_go};
@@ -28,27 +28,26 @@ use crate::force::is_forced;
 use crate::fsx::Identity;
 use crate::handed::Handed;
 use crate::past::Unread;
-use crate::protocol::Request;
 use crate::publish::{Conclusion, Desk, OUTPUT, discard};
 use crate::publish_error::PublishError;
 use crate::pulse::Pulse;
 use crate::reuse::Sought;
 use crate::schedule::{Schedule, Turn, Waits};
 use crate::settings::Settings;
+use crate::settle::Rest;
 use crate::supervise::{Cause, Ended};
 use crate::world::World;
 
 mod carry;
+mod request;
 mod staff;
 mod worked;
 
+pub(crate) use request::{IN_HAND, WITNESS};
+use request::{limits, request};
 use staff::Staff;
 use worked::Worked;
 
-/// Left by a worker that outlived the daemon: the file it worked on did not kill it.
-pub(crate) const WITNESS: &str = "outlived";
-/// There while the daemon reads a worker's answer.
-pub(crate) const IN_HAND: &str = "in-hand";
 /// How often a running job asks whether anyone wants it stopped.
 const ASK_EVERY: Duration = Duration::from_millis(500);
 /// What happened, for the thread that looks after the folders.
@@ -359,6 +358,11 @@ impl Slot {
             Ok(profile) => profile,
             Err(reason) => return Worked::Step(Step::Wait { reason }),
         };
+        let settle = config.settle.unwrap_or(Rest::by_default(false, context.once).settle);
+        let toolpath = match beside::of_job(&profile, (folder, job), &folder.work(claim.token), (context.world.wall(), settle)) {
+            Ok(toolpath) => toolpath,
+            Err(reason) => return Worked::Step(Step::Wait { reason }),
+        };
         if let Some(copied) = self.copied(&config, folder, claim, job, claimed, &profile) {
             return copied;
         }
@@ -368,7 +372,7 @@ impl Slot {
                 Ok(worker) => worker,
                 Err(error) => return Worked::Step(Step::Wait { reason: format!("a worker process cannot be started: {error}") }),
             };
-        let request = request(folder, claim, job, profile, limits);
+        let request = request(folder, claim, job, (profile, toolpath), limits);
         let asked = Cell::new(context.world.steady());
         let lease = Cell::new(Lease::Held);
         let stop = || {
@@ -413,7 +417,9 @@ impl Slot {
         claimed: &Claimed,
         profile: &Profile,
     ) -> Option<Worked> {
-        if !config.reuse || job.retried.is_some() || is_forced(&job.source.path) {
+        // Another tool path of the same name makes another result.
+        let has_path = !profile.residue.toolpath.is_empty();
+        if has_path || !config.reuse || job.retried.is_some() || is_forced(&job.source.path) {
             return None;
         }
         let (context, work) = (&self.context, folder.work(claim.token));
@@ -440,30 +446,6 @@ impl Slot {
             Lease::Held => Worked::Step(Step::HandBack),
         }
     }
-}
-
-/// What a worker is to do for a job.
-fn request(folder: &Folder, claim: &Claim, job: &Job, profile: Profile, limits: Limits) -> Request {
-    let work = folder.work(claim.token);
-    Request {
-        task: Task::Repair,
-        input: work.join(CLAIMED),
-        output: Some(work.join(OUTPUT)),
-        report: None,
-        witness: Some(work.join(WITNESS)),
-        mark: Some(work.join(IN_HAND)),
-        shown_input: folder.inbox().join(job.source.path.to_path()).display().to_string(),
-        shown_output: None,
-        profile,
-        limits,
-    }
-}
-
-/// A small file gets one thread and its slot's share of the memory; a file alone gets everything.
-fn limits(config: &Config, turn: Turn) -> Limits {
-    let alone = turn.is_alone();
-    let memory = if alone { config.memory } else { config.memory / config.workers.max(1) as u64 };
-    Limits::default().with_memory(memory).with_threads(if alone { config.threads } else { 1 })
 }
 
 /// Is the output the very file that the worker wrote, synced and read back?

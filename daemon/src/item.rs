@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use suture_core::report::{Certificate, Outcome, RuleOutcome, Task};
 use suture_core::{ErrorClass, Limits, Profile, Report};
 
+use crate::beside;
 use crate::course::Course;
 use crate::draft::Draft;
 use crate::exit::Exit;
@@ -100,6 +101,7 @@ impl Order<'_> {
             shown_input: input.display().to_string(),
             shown_output: None,
             profile: self.profile.clone(),
+            toolpath: beside::of_command(&self.profile, input),
             limits,
         };
         let (mut output, mut report) = (None, None);

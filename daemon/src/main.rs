@@ -8,6 +8,7 @@ mod alike;
 mod attempt;
 mod bar;
 mod batch;
+mod beside;
 mod carry;
 mod choice;
 mod claim;

@@ -125,10 +125,19 @@ fn work(request: &Request) -> suture_core::error::Result<Report> {
     let mut limits = request.limits.clone();
     limits.access = access;
     let limits = &limits;
+    let mut own = profile.clone();
+    if let Some(path) = request.toolpath.as_ref().and_then(|path| path.at.to_str()) {
+        own.residue.toolpath = path.into();
+    }
     let mut report = match (request.task, &request.output) {
-        (Task::Repair, Some(output)) => suture_core::repair(input, output, profile, limits, &teller)?,
-        _ => suture_core::inspect(input, profile, limits, &teller)?,
+        (Task::Repair, Some(output)) => suture_core::repair(input, output, &own, limits, &teller)?,
+        _ => suture_core::inspect(input, &own, limits, &teller)?,
     };
+    if let Some(path) = &request.toolpath {
+        report.profile.residue.toolpath.clone_from(&profile.residue.toolpath);
+        let why = report.residue.as_mut().and_then(|residue| residue.why_not.as_mut());
+        why.into_iter().for_each(|why| *why = why.replace(&*path.at.to_string_lossy(), &path.shown));
+    }
     report.input.path = request.shown_input.clone().into();
     if let (Some(facts), Some(shown)) = (&mut report.output, &request.shown_output) {
         facts.path = shown.clone().into();

@@ -56,7 +56,10 @@ impl Profile {
     /// [`ProfileError`] names the first of these settings, its value and its range.
     pub fn validate(&self) -> Result<(), ProfileError> {
         let sides = self.build_volume_mm.map(|side| ("build_volume_mm", side, Range::Bound));
-        let residue = [("residue.tolerance_mm", self.residue.tolerance_mm, Range::Bound)];
+        let residue = [
+            ("residue.tolerance_mm", self.residue.tolerance_mm, Range::Bound),
+            ("residue.wait_minutes", self.residue.wait_minutes, Range::Bound),
+        ];
         for (setting, value, range) in self.numbers().into_iter().chain(sides).chain(residue) {
             if !range.contains(value) {
                 return Err(ProfileError { setting, value, range: range.words() });

@@ -3,12 +3,15 @@
 use serde::{Deserialize, Serialize};
 
 /// Residue of a milling tool that is to be removed.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 #[non_exhaustive]
 pub struct ResidueSettings {
     /// The tool path that cut the part, a file: G-code, APT or CL data, or a project of CAMotics. Empty: no residue is looked for.
+    /// In the daemon, `*` is the mesh's own name, and the path is copied before a worker begins: workers reach no other file.
     pub toolpath: String,
+    /// How long a mesh of a hot folder waits for its tool path, in minutes; without one, it is repaired, and the report says so.
+    pub wait_minutes: f64,
     /// Its tools, where the path itself does not describe them: `3=ball,d=6`, lengths in millimetres.
     pub tools: Vec<String>,
     /// How far vertices of a cut surface may be from what the tool cut, in millimetres: noise of the simulation. 0: by the tool's size and single precision.
@@ -17,4 +20,17 @@ pub struct ResidueSettings {
     pub include: Vec<[[f64; 3]; 2]>,
     /// Boxes of which no triangle is residue's; they count more than the others.
     pub exclude: Vec<[[f64; 3]; 2]>,
+}
+
+impl Default for ResidueSettings {
+    fn default() -> Self {
+        Self {
+            toolpath: String::new(),
+            wait_minutes: 10.0,
+            tools: Vec::new(),
+            tolerance_mm: 0.0,
+            include: Vec::new(),
+            exclude: Vec::new(),
+        }
+    }
 }

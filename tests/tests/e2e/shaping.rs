@@ -6,6 +6,7 @@ use serde_json::Value;
 use suture_bench::cut::{self, CASES, FRESH};
 use suture_bench::judge::judge;
 use suture_tests::Place;
+use suture_tests::served::{Served, jobs, wait_until};
 use suture_tests::stl::{self, Triangle};
 
 /// Rows and columns of the sphere, and its radius.
@@ -179,6 +180,40 @@ fn marks_of_a_tool_go() {
         }
         assert!(kept as f64 > 0.97 * f64::from(count), "{name}: {kept} of {count}");
     }
+}
+
+/// A mesh and its tool path come to a hot folder, the path later; where none comes in time, the mesh is done without it.
+#[test]
+fn a_mesh_waits_for_the_tool_path_beside_it() {
+    let (place, case) = (Place::new(), CASES.iter().find(|case| case.name == "floor ball 1").unwrap());
+    let part = cut::make(case);
+    let settings = |minutes: u32| {
+        format!("[residue]\ntoolpath = \"*.nc\"\nwait_minutes = {minutes}\ntools = [\"{}\"]\n", case.cutter.words())
+    };
+    place.put("hot/in/cut/.suture.toml", settings(10).as_bytes());
+    place.put("hot/in/alone/.suture.toml", settings(0).as_bytes());
+    place.put("hot/in/cut/part.stl", &part.stl());
+    place.put("hot/in/alone/lone.stl", &part.stl());
+    let _daemon = Served::start(&place, &["hot", "--settle", "300ms"], "log");
+    let note = |path: &str| {
+        let all = jobs(&place, "hot");
+        let job = all.iter().find(|job| job["source"]["path"] == path);
+        job.map(|job| format!("{} {}", job["kind"], job["note"])).unwrap_or_default()
+    };
+    wait_until("it waits, and says for which file", || {
+        note("cut/part.stl").contains("part.nc, its tool path, is not beside it yet")
+    });
+    wait_until("the other one is done", || note("alone/lone.stl").contains("done"));
+    place.put("hot/in/cut/part.NC", part.code.as_bytes());
+    wait_until("it is done", || note("cut/part.stl").contains("done"));
+    let report = |name: &str| -> Value { serde_json::from_slice(&place.read(name)).unwrap() };
+    let (cut, alone) = (report("hot/out/cut/part.stl.report.json"), report("hot/out/alone/lone.stl.report.json"));
+    assert_eq!(cut["profile"]["residue"]["toolpath"], "*.nc");
+    assert_eq!(cut["residue"]["regions"].as_array().unwrap().len(), 1, "{}", cut["residue"]);
+    assert!(read(&place, "hot/out/cut/part.stl").len() < part.labels.len());
+    assert!(alone["residue"]["why_not"].as_str().unwrap().starts_with("lone.nc: cannot be read"), "{}", alone["residue"]);
+    assert!(place.read("hot/out/alone/lone.stl") == part.stl());
+    assert!(place.read("hot/in/cut/part.NC") == part.code.as_bytes(), "the path stays where it is");
 }
 
 /// A triangle's bits, from its least corner on.

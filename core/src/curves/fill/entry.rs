@@ -2,12 +2,14 @@
 
 use rayon::prelude::*;
 
+use super::chords::{self, Chord};
 use super::layout::Corner;
 use super::mesh::Mesh;
 use super::network::{self, Divided, Strands};
 use super::options::{Continuity, Options, Outline};
 use super::orient;
 use super::patch::{Patch, Task, Tried};
+use super::poor::Split;
 use super::report::{Report, Surface};
 use super::strand::Strand;
 use super::tangent::{self, Beside};
@@ -16,6 +18,12 @@ use crate::curves::vector::Point;
 
 /// Edges of curves may be longer than those within by this factor.
 const COARSER: f64 = 1.3;
+
+/// Rounds in which curves are divided for the sake of triangles, at most.
+const ROUNDS: u32 = 12;
+
+/// An outline whose triangles have not become better in so many rounds is too narrow to be divided.
+const PATIENCE: u32 = 4;
 
 /// Filled outlines.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -81,31 +89,69 @@ pub fn fill_beside(
     let mut divided = network::divide(&strands, outlines, options, &[]);
     if options.size.is_none() {
         // Curves are divided as finely as their surfaces have to be, else triangles between both would be flat.
-        let dry: Vec<Patch> = tasks((&strands, &tried), outlines, options, &divided, true).par_iter().map(Task::run).collect();
+        let dry: Vec<Patch> = tasks((&strands, &tried), (outlines, &[]), options, &divided, true).par_iter().map(Task::run).collect();
         let longest: Vec<f64> = dry.iter().map(|patch| COARSER * patch.longest).collect();
         if network::is_coarser(&divided, &longest) {
             divided = network::divide(&strands, outlines, options, &longest);
         }
     }
-    let tasks = tasks((&strands, &tried), outlines, options, &divided, false);
-    let mut patches: Vec<Patch> = tasks.par_iter().map(Task::run).collect();
+    let mut patches = evened((&strands, &tried), outlines, options, &mut divided);
+    let meshes: Vec<&[[Corner; 3]]> = patches.iter().map(|patch| patch.triangles.as_slice()).collect();
+    let chords = chords::shared(&meshes, divided.curves.par_iter().map(Vec::as_slice));
+    let tasks = tasks((&strands, &tried), (outlines, &chords), options, &divided, false);
+    patches.par_iter_mut().zip(&tasks).filter(|(_, task)| !task.chords.is_empty()).for_each(|(patch, task)| *patch = task.run());
     if options.continuity == Continuity::Tangent {
         tangent::bend(&tasks, &mut patches, beside);
     }
     collected(divided.points, patches, (strands, outlines))
 }
 
+/// Patches of outlines, whose curves are divided until triangles are even or for so many rounds.
+fn evened<'a>(
+    known: (&'a Strands<'a>, &'a [Tried]),
+    outlines: &'a [Outline],
+    options: &'a Options,
+    divided: &mut Divided,
+) -> Vec<Patch> {
+    let mut patches: Vec<Patch> = tasks(known, (outlines, &[]), options, divided, false).par_iter().map(Task::run).collect();
+    // The fewest poor triangles of each outline so far, and the round of that.
+    let mut best: Vec<(usize, u32)> = patches.iter().map(|patch| (patch.report.poor, 0)).collect();
+    for round in 0..ROUNDS {
+        let mut splits: Vec<Split> = Vec::new();
+        for (patch, (fewest, at)) in patches.iter_mut().zip(&mut best) {
+            if patch.report.poor < *fewest {
+                (*fewest, *at) = (patch.report.poor, round);
+            }
+            let own = std::mem::take(&mut patch.splits);
+            splits.extend(own.into_iter().filter(|_| round < *at + PATIENCE));
+        }
+        let touched = divided.split(known.0, outlines, splits);
+        if touched.is_empty() {
+            break;
+        }
+        let tasks = tasks(known, (outlines, &[]), options, divided, false);
+        let again: Vec<(usize, Patch)> =
+            touched.into_par_iter().filter_map(|number| Some((number, tasks.get(number)?.run()))).collect();
+        for (number, patch) in again {
+            if let Some(old) = patches.get_mut(number) {
+                *old = patch;
+            }
+        }
+    }
+    patches
+}
+
 /// The task of each outline.
 fn tasks<'a>(
     (strands, tried): (&'a Strands<'a>, &'a [Tried]),
-    outlines: &'a [Outline],
+    (outlines, chords): (&'a [Outline], &'a [Vec<Chord>]),
     options: &'a Options,
     divided: &'a Divided,
     is_dry: bool,
 ) -> Vec<Task<'a>> {
     let wanted = divided.rings.iter().zip(&divided.wanted);
-    let all = outlines.iter().zip(tried).zip(wanted);
-    all.map(|((outline, tried), (rings, &(longest, chord)))| Task {
+    let all = outlines.iter().zip(tried).zip(wanted).enumerate();
+    all.map(|(number, ((outline, tried), (rings, &(longest, chord))))| Task {
         outline,
         strands,
         rings,
@@ -114,6 +160,7 @@ fn tasks<'a>(
         chord,
         is_dry,
         tried,
+        chords: chords.get(number).map_or(&[], Vec::as_slice),
     })
     .collect()
 }

@@ -18,7 +18,7 @@ pub(super) struct Rim {
 }
 
 /// A corner of the mesh.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Corner {
     /// On the outline, by its number in the mesh.
     Rim(u32),
@@ -35,6 +35,49 @@ pub(super) struct Layout {
     pub(super) added: Vec<Point>,
     /// Whether the outer ring runs clockwise as it is given, so that the chart was mirrored.
     pub(super) is_mirrored: bool,
+}
+
+impl Layout {
+    /// Halves edges of cuts, which are given by the numbers of their places among those of all rings; whether any was. Both sides of a cut get the same
+    /// point. O(places · log places).
+    pub(super) fn halve(&mut self, edges: &[[u32; 2]]) -> bool {
+        let places: Vec<(usize, usize)> =
+            self.rings.iter().enumerate().flat_map(|(ring, all)| (0..all.len()).map(move |at| (ring, at))).collect();
+        let ends = |(ring, at): (usize, usize)| {
+            let all = self.rings.get(ring)?;
+            let ((a, p), (b, q)) = (*all.get(at)?, *all.get((at + 1) % all.len())?);
+            Some(([a.min(b), a.max(b)], [0.5 * (p[0] + q[0]), 0.5 * (p[1] + q[1])]))
+        };
+        let mut known: Vec<([Corner; 2], (usize, usize))> =
+            places.iter().filter_map(|at| Some((ends(*at)?.0, *at))).collect();
+        known.sort_unstable();
+        let mut new: Vec<((usize, usize), (Corner, [f64; 2]))> = Vec::new();
+        let mut done: Vec<[Corner; 2]> = Vec::new();
+        for [a, b] in edges {
+            let corner = |number: u32| places.get(number as usize).and_then(|(ring, at)| self.rings.get(*ring)?.get(*at)).map(|(corner, _)| *corner);
+            let (Some(a), Some(b)) = (corner(*a), corner(*b)) else { continue };
+            let pair = [a.min(b), a.max(b)];
+            let first = known.partition_point(|(other, _)| *other < pair);
+            let both: Vec<(usize, usize)> =
+                known.iter().skip(first).take_while(|(other, _)| *other == pair).map(|(_, at)| *at).collect();
+            if both.len() != 2 || done.contains(&pair) {
+                continue;
+            }
+            done.push(pair);
+            let middles: Vec<[f64; 2]> = both.iter().filter_map(|at| ends(*at)).map(|(_, middle)| middle).collect();
+            let Some(middle) = middles.first() else { continue };
+            let corner = Corner::Inner(self.added.len() as u32);
+            self.added.push(self.chart.point(*middle));
+            new.extend(both.into_iter().zip(middles).map(|(at, middle)| (at, (corner, middle))));
+        }
+        new.sort_by_key(|(at, _)| std::cmp::Reverse(*at));
+        for ((ring, at), entry) in &new {
+            if let Some(all) = self.rings.get_mut(*ring) {
+                all.insert(at + 1, *entry);
+            }
+        }
+        !new.is_empty()
+    }
 }
 
 /// Twice the area within a ring.

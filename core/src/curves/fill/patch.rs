@@ -4,7 +4,7 @@ use std::sync::OnceLock;
 
 use super::blend::{self, Curves};
 use super::carrier::{self, Carrier};
-use super::chords;
+use super::chords::{self, Chord};
 use super::coons::Coons;
 use super::fans;
 use super::fit::FitError;
@@ -12,6 +12,7 @@ use super::improve::Improved;
 use super::layout::{self, Corner, Layout, Rim};
 use super::lifted::Lifted;
 use super::options::{Options, Outline};
+use super::poor::{self, Split};
 use super::refine;
 use super::report::{Method, Problem, Report, Surface};
 use super::sides;
@@ -27,6 +28,8 @@ const GAP: f64 = 3e-5;
 /// Products of points within and on outlines that heights may cost.
 const COSTLIEST: f64 = 1e8;
 
+/// Rounds in which cuts are divided, at most.
+const CUTS: u32 = 12;
 /// Parameters each way at which a surface is looked at again.
 const FINER: u32 = 64;
 
@@ -43,6 +46,8 @@ pub(super) struct Task<'a> {
     /// Whether the length of edges that the surface wants is all that is asked for: nothing is meshed then, and no heights are made.
     pub(super) is_dry: bool,
     pub(super) tried: &'a Tried,
+    /// Edges that other outlines have too.
+    pub(super) chords: &'a [Chord],
 }
 
 /// Surfaces of an outline that do not depend on how its curves are divided, made when they are first asked for.
@@ -63,16 +68,27 @@ pub(super) struct Patch {
     pub(super) triangles: Vec<[Corner; 3]>,
     /// The longest edge that the surface allows.
     pub(super) longest: f64,
+    /// Where its curves are to be divided so that its triangles become even.
+    pub(super) splits: Vec<Split>,
 }
 
 /// Points within, triangles, and the longest edge that the surface allows.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 struct Meshed {
     points: Vec<Point>,
     triangles: Vec<[Corner; 3]>,
     longest: f64,
+    /// Triangles below 0.4: at corners of the outline below 15°, and elsewhere.
+    poor: [usize; 2],
+    splits: Vec<Split>,
     /// Whether triangles beside each other face away from each other.
     turns_back: bool,
+}
+
+fn patch(surface: Surface, mut report: Report, meshed: Meshed) -> Patch {
+    let Meshed { points, triangles, longest, poor, splits, .. } = meshed;
+    [report.sharp, report.poor] = poor;
+    Patch { surface, report, points, triangles, longest, splits }
 }
 
 impl<'a> Task<'a> {
@@ -100,6 +116,8 @@ impl<'a> Task<'a> {
             is_folded: false,
             is_ambiguous: self.is_ambiguous(),
             is_flipped: false,
+            sharp: 0,
+            poor: 0,
             problem: None,
         };
         if self.rings.first().is_none_or(|ring| ring.len() < 3) {
@@ -111,16 +129,16 @@ impl<'a> Task<'a> {
             return self.fallback(report);
         }
         let tolerance = self.options.carrier.unwrap_or(1e-5 * size).max(report.gap.min(GAP * size));
-        let patch = self.carrier(&probes, tolerance, &mut report).or_else(|| self.blended(cosines, &corners, &mut report));
-        match patch {
-            Some((surface, Meshed { points, triangles, longest, .. })) => Patch { surface, report, points, triangles, longest },
+        let found = self.carrier(&probes, tolerance, &mut report).or_else(|| self.blended(cosines, &corners, &mut report));
+        match found {
+            Some((surface, meshed)) => patch(surface, report, meshed),
             None => self.fallback(report),
         }
     }
 
     fn fallback(&self, report: Report) -> Patch {
         let rings = self.rings.iter().map(|ring| ring.iter().map(|rim| rim.vertex).collect()).collect();
-        Patch { surface: Surface::Fallback(rings), report, points: Vec::new(), triangles: Vec::new(), longest: f64::INFINITY }
+        Patch { surface: Surface::Fallback(rings), report, points: Vec::new(), triangles: Vec::new(), longest: f64::INFINITY, splits: Vec::new() }
     }
 
     fn carrier(&self, probes: &[Point], tolerance: f64, report: &mut Report) -> Option<(Surface, Meshed)> {
@@ -213,8 +231,8 @@ impl<'a> Task<'a> {
             let length = self.strands.get(one.curve).and_then(Option::as_ref).map_or(0.0, |strand| strand.length);
             lengths.iter_mut().skip(*side).take(1).for_each(|sum| *sum += length);
         }
-        let Meshed { points, triangles, longest, .. } = self.mesh(blend::laid(coons.clone(), &lengths, self.rings.first()?))?;
-        Some(Patch { surface: Surface::Coons(Box::new(coons)), report, points, triangles, longest })
+        let meshed = self.mesh(blend::laid(coons.clone(), &lengths, self.rings.first()?))?;
+        Some(patch(Surface::Coons(Box::new(coons)), report, meshed))
     }
 
     fn heights(&self, report: &mut Report) -> Option<(Surface, Meshed)> {
@@ -254,15 +272,18 @@ impl<'a> Task<'a> {
             return None;
         }
         let curves = parts.iter().map(|(strand, one)| fans::curve(strand, one, self.options)).collect::<Option<_>>()?;
+        let mut meshed = Meshed { longest: f64::INFINITY, ..Meshed::default() };
         let mut whole = fans::Spokes::new(ring, centre, self.options.inner);
         for part in fans::parts(ring, centre) {
             let (layout, rims) = whole.laid(&part);
             let alone = Task { rings: &[rims], ..*self };
-            let Meshed { points, triangles, .. } = alone.mesh(layout)?;
-            whole.take(&part, (points, triangles));
+            let part_of = alone.mesh(layout)?;
+            meshed.poor = [0, 1].map(|kind| meshed.poor[kind] + part_of.poor[kind]);
+            meshed.splits.extend(part_of.splits);
+            whole.take(&part, (part_of.points, part_of.triangles));
         }
         report.method = Method::Fans;
-        let meshed = Meshed { points: whole.points, triangles: whole.triangles, longest: f64::INFINITY, turns_back: false };
+        (meshed.points, meshed.triangles) = (whole.points, whole.triangles);
         Some((Surface::Fans { curves, centre }, meshed))
     }
 
@@ -272,14 +293,28 @@ impl<'a> Task<'a> {
         self.mesh_within(layout, self.options.inner.max(4 * rim))
     }
 
-    fn mesh_within(&self, layout: Layout, most: usize) -> Option<Meshed> {
+    /// Meshes a layout, whose cuts are divided until triangles are even or for so many rounds.
+    fn mesh_within(&self, mut layout: Layout, most: usize) -> Option<Meshed> {
+        let (mut meshed, mut blocking) = self.mesh_of(&layout, most)?;
+        for _ in 0..CUTS {
+            if meshed.poor[1] == 0 || !layout.halve(&blocking) {
+                break;
+            }
+            (meshed, blocking) = self.mesh_of(&layout, most)?;
+        }
+        Some(meshed)
+    }
+
+    /// Triangles of a layout, and the edges that are in the way of even ones, by their places.
+    fn mesh_of(&self, layout: &Layout, most: usize) -> Option<(Meshed, Vec<[u32; 2]>)> {
         let Layout { chart, rings, added, is_mirrored } = layout;
+        let is_mirrored = *is_mirrored;
         let mirrored = |[x, y]: [f64; 2]| [if is_mirrored { -x } else { x }, y];
         let places: Vec<Vec<[f64; 2]>> =
             rings.iter().map(|ring| ring.iter().map(|(_, place)| mirrored(*place)).collect()).collect();
         let longest = self.longest.min(chart.longest(self.chord, self.options.angle));
         if self.is_dry {
-            return Some(Meshed { points: Vec::new(), triangles: Vec::new(), longest, turns_back: false });
+            return Some((Meshed { longest, ..Meshed::default() }, Vec::new()));
         }
         let flat = triangles::triangles(&places)?;
         let corners: Vec<Corner> = rings.iter().flatten().map(|(corner, _)| *corner).collect();
@@ -296,12 +331,14 @@ impl<'a> Task<'a> {
         let rim = corners.iter().map(point).collect();
         let mut lifted = Lifted::new(flat);
         refine::refine(&mut lifted, longest, corners.len() + most);
-        lifted.raise(rim, &chart, is_mirrored);
-        refine::refine(&mut lifted, longest, corners.len() + most);
+        lifted.raise(rim, chart, is_mirrored);
+        let blocking = refine::refine(&mut lifted, longest, corners.len() + most);
         let turns_back = lifted.is_folded();
         let mut improved = Improved::new(lifted);
         improved.run(most);
-        chords::divide(&mut improved.lifted, &corners);
+        chords::divide(&mut improved.lifted, &corners, self.chords);
+        let poor = self.poor(&improved.lifted, &corners);
+        let splits = if poor[1] > 0 { self.splits(&corners, &blocking) } else { Vec::new() };
         let first = added.len() as u32;
         let corner = |number: u32| {
             let within = || Corner::Inner(first + number - corners.len() as u32);
@@ -309,7 +346,22 @@ impl<'a> Task<'a> {
         };
         let triangles = improved.lifted.flat.triangles.iter().map(|triangle| triangle.map(corner)).collect();
         let points = added.iter().chain(improved.lifted.points.get(corners.len()..).unwrap_or_default()).copied().collect();
-        Some(Meshed { points, triangles, longest, turns_back })
+        Some((Meshed { points, triangles, longest, poor, splits, turns_back }, blocking))
+    }
+
+    /// Triangles below 0.4: at corners of the outline below 15°, and elsewhere.
+    fn poor(&self, lifted: &Lifted<'_>, corners: &[Corner]) -> [usize; 2] {
+        poor::count(&lifted.flat.triangles, corners, |number| lifted.point(number), &poor::cosines(self.rings))
+    }
+
+    /// Where to divide curves for the sake of edges that are in the way, given by their places.
+    fn splits(&self, corners: &[Corner], blocking: &[[u32; 2]]) -> Vec<Split> {
+        let vertex = |number: u32| match corners.get(number as usize) {
+            Some(Corner::Rim(vertex)) => Some(*vertex),
+            _ => None,
+        };
+        let edges: Vec<[u32; 2]> = blocking.iter().filter_map(|[a, b]| Some([vertex(*a)?, vertex(*b)?])).collect();
+        poor::splits(self.outline, self.rings, &edges)
     }
 
     /// Curves fitted, in the direction of the outer loop, and the largest error.

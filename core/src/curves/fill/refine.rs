@@ -23,35 +23,34 @@ const HEIGHTS: [f64; 2] = [0.45, 0.7];
 const APART: f64 = 0.6;
 /// How much shorter edges may be at a distance from longer ones of rings, in parts of that.
 const DECAY: f64 = 0.35;
+/// Passes over all triangles, at most.
+const PASSES: u32 = 4;
 /// The least distance of others, for a triangle that is too large, in parts of the largest radius.
 const WIDE: f64 = 0.8;
 
 /// Refines until no triangle is below 0.46, and none has a wider circle than one with edges of the length `longest`, or of those of rings
 /// nearby that are longer, where rings allow it; places are no more than `most` with those of rings. Triangles are divided in the order in
 /// which they arise, so places go in layer by layer from rings, and each changes few triangles. O(n log n).
-pub(super) fn refine(lifted: &mut Lifted<'_>, longest: f64, most: usize) {
+///
+/// Gives the edges of rings, by their places, that are in the way of triangles below 0.46: a finer division of them would help.
+pub(super) fn refine(lifted: &mut Lifted<'_>, longest: f64, most: usize) -> Vec<[u32; 2]> {
     lifted.legalise_all();
     let sizes = sizes(lifted, longest);
-    let mut state = State { lifted, sizes, longest, changed: Vec::new() };
+    let mut state = State { lifted, sizes, longest, changed: Vec::new(), blocking: Vec::new() };
     state.changed.extend(0..state.lifted.flat.triangles.len() as u32);
-    let mut queue: VecDeque<(u32, [u32; 3])> = VecDeque::new();
-    loop {
-        state.changed.sort_unstable();
-        state.changed.dedup();
-        for triangle in std::mem::take(&mut state.changed) {
-            if Shape::of(state.lifted, triangle).is_bad(state.radius(triangle)) {
-                queue.push_back((triangle, state.lifted.corners(triangle)));
-            }
+    for _ in 0..PASSES {
+        // A triangle that could not be divided may be later, when others around it are.
+        let before = state.lifted.points.len();
+        state.blocking.clear();
+        state.pass(most);
+        if state.blocking.is_empty() || state.lifted.points.len() == before {
+            break;
         }
-        let Some((triangle, corners)) = queue.pop_front() else { return };
-        if state.lifted.points.len() >= most {
-            return;
-        }
-        // It may have changed since.
-        if state.lifted.corners(triangle) == corners {
-            state.divide(triangle);
-        }
+        state.changed.extend(0..state.lifted.flat.triangles.len() as u32);
     }
+    state.blocking.sort_unstable();
+    state.blocking.dedup();
+    state.blocking
 }
 
 /// The length of edges wanted at each place: `longest`, or that of edges of rings there, if these are longer, getting shorter
@@ -148,6 +147,8 @@ struct State<'s, 'a> {
     sizes: Vec<f64>,
     longest: f64,
     changed: Vec<u32>,
+    /// Edges of rings that are in the way of flat triangles, by their places.
+    blocking: Vec<[u32; 2]>,
 }
 
 impl State<'_, '_> {
@@ -160,6 +161,28 @@ impl State<'_, '_> {
         self.lifted.corners(triangle).into_iter().fold(self.longest, |most, corner| most.max(self.size(corner))) / 3.0_f64.sqrt()
     }
 
+    /// Divides triangles until none is left that can be.
+    fn pass(&mut self, most: usize) {
+        let mut queue: VecDeque<(u32, [u32; 3])> = VecDeque::new();
+        loop {
+            self.changed.sort_unstable();
+            self.changed.dedup();
+            for triangle in std::mem::take(&mut self.changed) {
+                if Shape::of(self.lifted, triangle).is_bad(self.radius(triangle)) {
+                    queue.push_back((triangle, self.lifted.corners(triangle)));
+                }
+            }
+            let Some((triangle, corners)) = queue.pop_front() else { return };
+            if self.lifted.points.len() >= most {
+                return;
+            }
+            // It may have changed since.
+            if self.lifted.corners(triangle) == corners {
+                self.divide(triangle);
+            }
+        }
+    }
+
     /// Divides a triangle, if a place for that is found.
     fn divide(&mut self, triangle: u32) {
         let shape = Shape::of(self.lifted, triangle);
@@ -169,22 +192,34 @@ impl State<'_, '_> {
         let height = if is_flat { centre.min(OFF * shape.shortest) } else { centre };
         // The shortest edge may be longer than what is wanted of all.
         let clear = if is_flat { shape.shortest.min(radius) } else { WIDE * radius };
-        if let Some(place) = above(self.lifted, shape.edge, height)
-            && let Some((inside, place, point)) = settled(self.lifted, triangle, place, clear)
-        {
-            let corners = self.lifted.corners(inside);
-            let least = |corner: u32| self.size(corner) - DECAY * distance(self.lifted.point(corner), point);
-            let size = corners.into_iter().fold(self.longest, |most, corner| most.max(least(corner)));
-            if self.lifted.insert(inside, place, point, &mut self.changed) {
-                self.sizes.push(size);
+        let Some(place) = above(self.lifted, shape.edge, height) else { return };
+        match settled(self.lifted, triangle, place, clear) {
+            Ok((inside, place, point)) => {
+                let corners = self.lifted.corners(inside);
+                let least = |corner: u32| self.size(corner) - DECAY * distance(self.lifted.point(corner), point);
+                let size = corners.into_iter().fold(self.longest, |most, corner| most.max(least(corner)));
+                if self.lifted.insert(inside, place, point, &mut self.changed) {
+                    self.sizes.push(size);
+                }
             }
+            Err(edge) if is_flat => {
+                let ends = edge.map(|edge| self.lifted.around(edge)).map(|[_, a, b]| [a, b]);
+                self.blocking.extend(ends);
+            }
+            Err(_) => {}
         }
     }
 }
 
-/// Where a place goes: the triangle, the place, and its point. `None` if others are nearer there than `clear`.
-fn settled(lifted: &Lifted<'_>, from: u32, mut place: [f64; 2], mut clear: f64) -> Option<(u32, [f64; 2], Point)> {
-    let mut end = lifted.walk(from, place)?;
+/// Where a place goes: the triangle, the place, and its point; if others are nearer there than `clear`, the longest edge of a ring that is in the
+/// way, if one is.
+fn settled(
+    lifted: &Lifted<'_>,
+    from: u32,
+    mut place: [f64; 2],
+    mut clear: f64,
+) -> Result<(u32, [f64; 2], Point), Option<u32>> {
+    let mut end = lifted.walk(from, place).ok_or(None)?;
     let mut point = lifted.lift(place);
     let low = |triangle: u32, point: Point, least: f64| {
         (3 * triangle..3 * triangle + 3).find(|edge| {
@@ -192,25 +227,35 @@ fn settled(lifted: &Lifted<'_>, from: u32, mut place: [f64; 2], mut clear: f64) 
             lifted.beyond(*edge) == NONE && norm(cross(sub(b, a), sub(point, a))) < least * dot(sub(b, a), sub(b, a))
         })
     };
+    let length = |edge: u32| {
+        let [_, a, b] = lifted.around(edge).map(|corner| lifted.point(corner));
+        distance(a, b)
+    };
     let edge = match end {
         End::At(edge) => Some(edge),
         End::In(triangle) => low(triangle, point, HEIGHTS[0]),
     };
     if let Some(edge) = edge {
-        let [_, a, b] = lifted.around(edge).map(|corner| lifted.point(corner));
-        let length = distance(a, b);
-        place = above(lifted, edge, HEIGHTS[1] * length)?;
-        clear = APART * length;
+        let along = length(edge);
+        place = above(lifted, edge, HEIGHTS[1] * along).ok_or(edge)?;
+        clear = APART * along;
         point = lifted.lift(place);
-        end = lifted.walk(edge / 3, place)?;
+        end = lifted.walk(edge / 3, place).ok_or(edge)?;
     }
-    let End::In(triangle) = end else { return None };
+    let longer = |other: u32| Some(edge.filter(|edge| length(*edge) >= length(other)).unwrap_or(other));
+    let triangle = match end {
+        End::In(triangle) => triangle,
+        End::At(other) => return Err(longer(other)),
+    };
     let is_clear = |corner: u32| distance(lifted.point(corner), point) >= clear;
     let across = |edge: u32| Some(lifted.beyond(edge)).filter(|other| *other != NONE).map(|other| lifted.around(other)[0]);
     let is_free = lifted.corners(triangle).into_iter().all(is_clear)
-        && (3 * triangle..3 * triangle + 3).filter_map(across).all(is_clear)
-        && low(triangle, point, 0.9 * HEIGHTS[0]).is_none();
-    is_free.then_some((triangle, place, point))
+        && (3 * triangle..3 * triangle + 3).filter_map(across).all(is_clear);
+    match low(triangle, point, 0.9 * HEIGHTS[0]) {
+        Some(other) => Err(longer(other)),
+        None if is_free => Ok((triangle, place, point)),
+        None => Err(edge),
+    }
 }
 
 #[cfg(test)]

@@ -1,5 +1,7 @@
 //! Outlines filled: the way in.
 
+use std::collections::BTreeMap;
+
 use rayon::prelude::*;
 
 use super::chords::{self, Chord};
@@ -106,7 +108,8 @@ pub fn fill_beside(
     collected(divided.points, patches, (strands, outlines))
 }
 
-/// Patches of outlines, whose curves are divided until triangles are even or for so many rounds.
+/// Patches of outlines, whose curves are divided until triangles are even or for so many rounds. If some outlines are no better then, all is done
+/// again without their wishes, which only make those beside them finer.
 fn evened<'a>(
     known: (&'a Strands<'a>, &'a [Tried]),
     outlines: &'a [Outline],
@@ -114,31 +117,56 @@ fn evened<'a>(
     divided: &mut Divided,
 ) -> Vec<Patch> {
     let mut patches: Vec<Patch> = tasks(known, (outlines, &[]), options, divided, false).par_iter().map(Task::run).collect();
+    let mut is_heard = vec![true; outlines.len()];
+    for _ in 0..2 {
+        let before = patches.iter().any(|patch| !patch.splits.is_empty()).then(|| divided.clone());
+        let mut first: BTreeMap<usize, Patch> = BTreeMap::new();
+        rounds((known, outlines, options), divided, &mut patches, (&is_heard, &mut first));
+        let is_worse = |number: &usize, patch: &Patch| {
+            patches.get(*number).is_some_and(|now| patch.report.poor > 0 && now.report.poor >= patch.report.poor)
+        };
+        let worse: Vec<usize> = first.iter().filter(|(number, patch)| is_worse(number, patch)).map(|(number, _)| *number).collect();
+        let (Some(before), false) = (before, worse.is_empty()) else { break };
+        worse.into_iter().for_each(|number| is_heard.iter_mut().skip(number).take(1).for_each(|heard| *heard = false));
+        *divided = before;
+        for (number, patch) in first {
+            patches.iter_mut().skip(number).take(1).for_each(|old| old.clone_from(&patch));
+        }
+    }
+    patches
+}
+
+/// Divides curves for the sake of outlines that are heard, and keeps the first patches of those that change.
+fn rounds<'a>(
+    (known, outlines, options): ((&'a Strands<'a>, &'a [Tried]), &'a [Outline], &'a Options),
+    divided: &mut Divided,
+    patches: &mut [Patch],
+    (is_heard, first): (&[bool], &mut BTreeMap<usize, Patch>),
+) {
     // The fewest poor triangles of each outline so far, and the round of that.
     let mut best: Vec<(usize, u32)> = patches.iter().map(|patch| (patch.report.poor, 0)).collect();
     for round in 0..ROUNDS {
         let mut splits: Vec<Split> = Vec::new();
-        for (patch, (fewest, at)) in patches.iter_mut().zip(&mut best) {
+        for ((patch, (fewest, at)), is_heard) in patches.iter().zip(&mut best).zip(is_heard) {
             if patch.report.poor < *fewest {
                 (*fewest, *at) = (patch.report.poor, round);
             }
-            let own = std::mem::take(&mut patch.splits);
-            splits.extend(own.into_iter().filter(|_| round < *at + PATIENCE));
+            splits.extend(patch.splits.iter().filter(|_| *is_heard && round < *at + PATIENCE));
         }
         let touched = divided.split(known.0, outlines, splits);
         if touched.is_empty() {
-            break;
+            return;
         }
         let tasks = tasks(known, (outlines, &[]), options, divided, false);
         let again: Vec<(usize, Patch)> =
             touched.into_par_iter().filter_map(|number| Some((number, tasks.get(number)?.run()))).collect();
         for (number, patch) in again {
             if let Some(old) = patches.get_mut(number) {
-                *old = patch;
+                let old = std::mem::replace(old, patch);
+                first.entry(number).or_insert(old);
             }
         }
     }
-    patches
 }
 
 /// The task of each outline.

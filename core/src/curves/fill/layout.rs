@@ -4,6 +4,7 @@ use std::f64::consts::TAU;
 
 use super::carrier::Carrier;
 use super::chart::{Chart, Turned};
+use super::poor::Wish;
 use crate::curves::vector::{Point, add, scale};
 
 /// A point of an outline.
@@ -38,42 +39,42 @@ pub(super) struct Layout {
 }
 
 impl Layout {
-    /// Halves edges of cuts, which are given by the numbers of their places among those of all rings; whether any was. Both sides of a cut get the same
-    /// point. O(places · log places).
-    pub(super) fn halve(&mut self, edges: &[[u32; 2]]) -> bool {
-        let places: Vec<(usize, usize)> =
-            self.rings.iter().enumerate().flat_map(|(ring, all)| (0..all.len()).map(move |at| (ring, at))).collect();
-        let ends = |(ring, at): (usize, usize)| {
-            let all = self.rings.get(ring)?;
-            let ((a, p), (b, q)) = (*all.get(at)?, *all.get((at + 1) % all.len())?);
-            Some(([a.min(b), a.max(b)], [0.5 * (p[0] + q[0]), 0.5 * (p[1] + q[1])]))
-        };
-        let mut known: Vec<([Corner; 2], (usize, usize))> =
-            places.iter().filter_map(|at| Some((ends(*at)?.0, *at))).collect();
+    /// Divides edges of cuts, which are in rings once in each direction; whether any was. Both sides of a cut get the same point. O(places · log places).
+    pub(super) fn divide(&mut self, wishes: &[Wish]) -> bool {
+        if self.added.is_empty() {
+            return false;
+        }
+        let mut known: Vec<([Corner; 2], usize, usize)> = Vec::new();
+        for (number, ring) in self.rings.iter().enumerate() {
+            let next = ring.iter().cycle().skip(1);
+            known.extend(ring.iter().zip(next).enumerate().map(|(at, ((a, _), (b, _)))| ([*a, *b], number, at)));
+        }
         known.sort_unstable();
+        let find = |ends: [Corner; 2]| {
+            let from = known.partition_point(|(other, ..)| *other < ends);
+            known.get(from).filter(|(other, ..)| *other == ends).map(|(_, ring, at)| (*ring, *at))
+        };
         let mut new: Vec<((usize, usize), (Corner, [f64; 2]))> = Vec::new();
-        let mut done: Vec<[Corner; 2]> = Vec::new();
-        for [a, b] in edges {
-            let corner = |number: u32| places.get(number as usize).and_then(|(ring, at)| self.rings.get(*ring)?.get(*at)).map(|(corner, _)| *corner);
-            let (Some(a), Some(b)) = (corner(*a), corner(*b)) else { continue };
-            let pair = [a.min(b), a.max(b)];
-            let first = known.partition_point(|(other, _)| *other < pair);
-            let both: Vec<(usize, usize)> =
-                known.iter().skip(first).take_while(|(other, _)| *other == pair).map(|(_, at)| *at).collect();
-            if both.len() != 2 || done.contains(&pair) {
+        for (ends, share) in wishes {
+            let [a, b] = *ends;
+            let (Some(there), Some(back)) = (find([a, b]), find([b, a])) else { continue };
+            if new.iter().any(|(at, _)| *at == there) {
                 continue;
             }
-            done.push(pair);
-            let middles: Vec<[f64; 2]> = both.iter().filter_map(|at| ends(*at)).map(|(_, middle)| middle).collect();
-            let Some(middle) = middles.first() else { continue };
+            let between = |(ring, at): (usize, usize), share: f64| {
+                let ring = self.rings.get(ring)?;
+                let ((_, p), (_, q)) = (ring.get(at)?, ring.get((at + 1) % ring.len())?);
+                Some([p[0] + share * (q[0] - p[0]), p[1] + share * (q[1] - p[1])])
+            };
+            let (Some(place), Some(other)) = (between(there, *share), between(back, 1.0 - share)) else { continue };
             let corner = Corner::Inner(self.added.len() as u32);
-            self.added.push(self.chart.point(*middle));
-            new.extend(both.into_iter().zip(middles).map(|(at, middle)| (at, (corner, middle))));
+            self.added.push(self.chart.point(place));
+            new.extend([(there, (corner, place)), (back, (corner, other))]);
         }
         new.sort_by_key(|(at, _)| std::cmp::Reverse(*at));
         for ((ring, at), entry) in &new {
-            if let Some(all) = self.rings.get_mut(*ring) {
-                all.insert(at + 1, *entry);
+            if let Some(ring) = self.rings.get_mut(*ring) {
+                ring.insert(at + 1, *entry);
             }
         }
         !new.is_empty()

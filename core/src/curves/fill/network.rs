@@ -15,7 +15,7 @@ use crate::curves::vector::{Point, distance};
 pub(super) type Strands<'a> = Vec<Option<Strand<'a>>>;
 
 /// Points of the mesh on curves.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Divided {
     /// All of them.
     pub(super) points: Vec<Point>,

@@ -5,12 +5,13 @@
 //! without end. Here outlines share their edges: all that are in the way are halved at once, for all outlines of a curve.
 
 use super::layout::{Corner, Rim};
+use super::lifted::Lifted;
 use super::mesh::of_triangle;
 use super::options::Outline;
-use crate::curves::vector::{Point, distance, dot, sub};
+use crate::curves::vector::{distance, dot, sub};
 
 /// Twice the ratio of radii below which a triangle is poor.
-pub(super) const LEAST: f64 = 0.4;
+const LEAST: f64 = 0.4;
 /// Cosines of 15° and of 50°: corners of an outline that are sharper than the first spoil their triangles by themselves, and corners sharper
 /// than the second have edges that are alike.
 const SHARP: [f64; 2] = [0.965_925_826, 0.642_787_61];
@@ -18,94 +19,119 @@ const SHARP: [f64; 2] = [0.965_925_826, 0.642_787_61];
 /// A place where a curve is to be divided: its number, and the share of its length.
 pub(super) type Split = (usize, f64);
 
-/// Cosines of the angles between the edges that meet at each point of rings, −1 where they go straight on. O(points).
-pub(super) fn cosines(rings: &[Vec<Rim>]) -> Vec<(u32, f64)> {
-    let mut all: Vec<(u32, f64)> = Vec::new();
-    for ring in rings {
-        all.extend((0..ring.len()).map(|at| (at_ring(ring, at).vertex, cosine(ring, at))));
+/// An edge that is to be divided: its ends in the direction of its ring, and how far from the first one, in parts of its length.
+pub(super) type Wish = ([Corner; 2], f64);
+
+/// Angles at the points of rings.
+#[derive(Debug)]
+pub(super) struct Angles<'a> {
+    rings: &'a [Vec<(Corner, [f64; 2])>],
+    /// By the numbers of places: cosines of angles within, −1 where the ring goes straight on, or within is more than half a turn.
+    cosines: Vec<f64>,
+}
+
+impl<'a> Angles<'a> {
+    /// Of rings whose places are the first ones of triangles. O(places).
+    pub(super) fn new(rings: &'a [Vec<(Corner, [f64; 2])>], lifted: &Lifted<'_>) -> Self {
+        let mut cosines = Vec::new();
+        let mut first = 0;
+        for ring in rings {
+            let count = ring.len();
+            for at in 0..count {
+                let numbers = [at + count - 1, at, at + 1].map(|at| (first + at % count) as u32);
+                let [before, own, next] = numbers.map(|number| lifted.point(number));
+                let product = distance(before, own) * distance(own, next);
+                // At the end of a cut or a seam, the surface is whole.
+                let corner = |at: usize| ring.get(at % count).map(|(corner, _)| *corner);
+                let is_end = corner(at + count - 1) == corner(at + 1);
+                let is_wide = is_end || lifted.area(numbers) <= 0.0 || product <= 0.0;
+                cosines.push(if is_wide { -1.0 } else { dot(sub(before, own), sub(next, own)) / product });
+            }
+            first += count;
+        }
+        Self { rings, cosines }
     }
-    all.sort_by(|a, b| a.0.cmp(&b.0).then(b.1.total_cmp(&a.1)));
-    all
-}
 
-fn at_ring(ring: &[Rim], at: usize) -> Rim {
-    ring.get(at % ring.len().max(1)).copied().unwrap_or(Rim { vertex: u32::MAX, point: [0.0; 3], part: 0, share: 0.0 })
-}
+    fn cosine(&self, number: u32) -> f64 {
+        self.cosines.get(number as usize).copied().unwrap_or(-1.0)
+    }
 
-fn cosine(ring: &[Rim], at: usize) -> f64 {
-    let [before, own, next] = [at + ring.len() - 1, at, at + 1].map(|at| at_ring(ring, at).point);
-    let product = distance(before, own) * distance(own, next);
-    if product > 0.0 { dot(sub(before, own), sub(next, own)) / product } else { -1.0 }
-}
+    /// How many triangles are poor: at corners below 15°, and elsewhere. O(triangles).
+    pub(super) fn count(&self, lifted: &Lifted<'_>) -> [usize; 2] {
+        let mut counts = [0; 2];
+        for triangle in &lifted.flat.triangles {
+            let [a, b, c] = triangle.map(|number| lifted.point(number));
+            if of_triangle(a, b, c) < LEAST {
+                let is_sharp = triangle.iter().any(|number| self.cosine(*number) > SHARP[0]);
+                counts[usize::from(!is_sharp)] += 1;
+            }
+        }
+        counts
+    }
 
-/// How many triangles are poor: at corners below 15°, and elsewhere. O(triangles · log points).
-pub(super) fn count(
-    triangles: &[[u32; 3]],
-    corners: &[Corner],
-    point: impl Fn(u32) -> Point,
-    cosines: &[(u32, f64)],
-) -> [usize; 2] {
-    let mut counts = [0; 2];
-    for triangle in triangles {
-        let [a, b, c] = triangle.map(&point);
-        if of_triangle(a, b, c) < LEAST {
-            let is_sharp = |corner: &u32| match corners.get(*corner as usize) {
-                Some(Corner::Rim(vertex)) => {
-                    let from = cosines.partition_point(|(number, _)| number < vertex);
-                    cosines.get(from).is_some_and(|(number, cosine)| number == vertex && *cosine > SHARP[0])
-                }
-                _ => false,
+    /// Where to divide edges, given by their places in the direction of their ring: in the middle; those of a corner below 50° both, at the same
+    /// distance from it, and those of one below 15° nowhere. O(edges · rings).
+    pub(super) fn wishes(&self, edges: &[[u32; 2]], lifted: &Lifted<'_>) -> Vec<Wish> {
+        let mut wishes = Vec::new();
+        for [from, to] in edges {
+            let (low, high) = (self.cosine(*from), self.cosine(*to));
+            let mut first = 0;
+            let Some(ring) = self.rings.iter().find(|ring| {
+                let is_own = (*from as usize) < first + ring.len();
+                first += if is_own { 0 } else { ring.len() };
+                is_own
+            }) else {
+                continue;
             };
-            let kind = if triangle.iter().any(is_sharp) { 0 } else { 1 };
-            counts[kind] += 1;
+            let (count, at) = (ring.len(), *from as usize - first);
+            let corner = |at: usize| ring.get(at % count).map(|(corner, _)| *corner);
+            let length = |at: usize| {
+                let [a, b] = [at, at + 1].map(|at| lifted.point((first + at % count) as u32));
+                distance(a, b)
+            };
+            let mut add = |at: usize, share: f64| {
+                if let (Some(a), Some(b)) = (corner(at), corner(at + 1)) {
+                    wishes.push(([a, b], share));
+                }
+            };
+            if low.max(high) > SHARP[0] {
+                continue;
+            }
+            if low.max(high) <= SHARP[1] {
+                add(at, 0.5);
+                continue;
+            }
+            // The edges before and behind the corner.
+            let (before, behind) = if low >= high { (at + count - 1, at) } else { (at, at + 1) };
+            let far = 0.5 * length(before).min(length(behind));
+            add(before, 1.0 - far / length(before));
+            add(behind, far / length(behind));
         }
+        wishes
     }
-    counts
 }
 
-/// Where to divide curves so that edges of an outline, given by their ends, are halved; those at corners below 15° are left, and those at other sharp
-/// corners are divided with the edge beside them, at the same distance from the corner. O((points + edges) · log points).
-pub(super) fn splits(outline: &Outline, rings: &[Vec<Rim>], edges: &[[u32; 2]]) -> Vec<Split> {
-    let mut known: Vec<([u32; 2], usize, usize)> = Vec::new();
-    for (number, ring) in rings.iter().enumerate() {
-        let ends = |at: usize| {
-            let (a, b) = (at_ring(ring, at).vertex, at_ring(ring, at + 1).vertex);
-            [a.min(b), a.max(b)]
-        };
-        known.extend((0..ring.len()).map(|at| (ends(at), number, at)));
-    }
-    known.sort_unstable();
-    let mut splits = Vec::new();
-    for [a, b] in edges {
-        let ends = [*a.min(b), *a.max(b)];
-        let from = known.partition_point(|(other, ..)| *other < ends);
-        let found = known.get(from).filter(|(other, ..)| *other == ends);
-        let Some((ring, at)) = found.and_then(|(_, number, at)| Some((rings.get(*number)?, *at))) else { continue };
-        let uses = std::iter::once(&outline.outer).chain(&outline.inner).nth(known.get(from).map_or(0, |(_, number, _)| *number));
-        let Some(uses) = uses else { continue };
-        let mut add = |at: usize, share: f64| {
-            let (one, next) = (at_ring(ring, at), at_ring(ring, at + 1));
+/// Where to divide curves, for wishes between points of rings that are not cut. O((points + wishes) · log points).
+pub(super) fn splits(outline: &Outline, rings: &[Vec<Rim>], wishes: &[Wish]) -> Vec<Split> {
+    let loops = std::iter::once(&outline.outer).chain(&outline.inner);
+    let mut known: Vec<([u32; 2], f64, Rim, usize)> = Vec::new();
+    for (ring, uses) in rings.iter().zip(loops) {
+        for (one, next) in ring.iter().zip(ring.iter().cycle().skip(1)) {
             let to = if next.part == one.part && next.share > one.share { next.share } else { 1.0 };
-            let place = one.share + share * (to - one.share);
-            splits.extend(uses.get(one.part as usize).map(|own| (own.curve, if own.is_reversed { 1.0 - place } else { place })));
-        };
-        let length = |at: usize| distance(at_ring(ring, at).point, at_ring(ring, at + 1).point);
-        let (low, high) = (cosine(ring, at), cosine(ring, at + 1));
-        if low.max(high) > SHARP[0] {
-            continue;
-        }
-        let before = at + ring.len() - 1;
-        if low.max(high) <= SHARP[1] {
-            add(at, 0.5);
-        } else if low >= high {
-            let far = 0.5 * length(at).min(length(before));
-            add(at, far / length(at));
-            add(before, 1.0 - far / length(before));
-        } else {
-            let far = 0.5 * length(at).min(length(at + 1));
-            add(at, 1.0 - far / length(at));
-            add(at + 1, far / length(at + 1));
+            if let Some(own) = uses.get(one.part as usize) {
+                // Shares in the direction of the curve.
+                let turned = |share: f64| if own.is_reversed { 1.0 - share } else { share };
+                let rim = Rim { share: turned(one.share), ..*one };
+                known.push(([one.vertex, next.vertex], turned(to), rim, own.curve));
+            }
         }
     }
-    splits
+    known.sort_by_key(|(ends, ..)| *ends);
+    let find = |ends: [u32; 2]| known.get(known.partition_point(|(other, ..)| *other < ends)).filter(|(other, ..)| *other == ends);
+    let split = |(ends, share): &Wish| {
+        let [Corner::Rim(a), Corner::Rim(b)] = *ends else { return None };
+        let found = find([a, b]).map(|found| (found, *share)).or_else(|| find([b, a]).map(|found| (found, 1.0 - share)));
+        found.map(|((_, to, rim, curve), share)| (*curve, rim.share + share * (to - rim.share)))
+    };
+    wishes.iter().filter_map(split).collect()
 }

@@ -22,10 +22,12 @@ use crate::curves::vector::Point;
 const COARSER: f64 = 1.3;
 
 /// Rounds in which curves are divided for the sake of triangles, at most.
-const ROUNDS: u32 = 12;
+const ROUNDS: u32 = 24;
 
+/// Times that all rounds are done again, at most.
+const AGAIN: u32 = 3;
 /// An outline whose triangles have not become better in so many rounds is too narrow to be divided.
-const PATIENCE: u32 = 4;
+const PATIENCE: u32 = 6;
 
 /// Filled outlines.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -108,8 +110,8 @@ pub fn fill_beside(
     collected(divided.points, patches, (strands, outlines))
 }
 
-/// Patches of outlines, whose curves are divided until triangles are even or for so many rounds. If some outlines are no better then, all is done
-/// again without their wishes, which only make those beside them finer.
+/// Patches of outlines, whose curves are divided until triangles are even or for so many rounds. If some outlines were better before, all is done
+/// again, and these wish nothing after the round in which they were best: it only makes those beside them finer.
 fn evened<'a>(
     known: (&'a Strands<'a>, &'a [Tried]),
     outlines: &'a [Outline],
@@ -117,45 +119,55 @@ fn evened<'a>(
     divided: &mut Divided,
 ) -> Vec<Patch> {
     let mut patches: Vec<Patch> = tasks(known, (outlines, &[]), options, divided, false).par_iter().map(Task::run).collect();
-    let mut is_heard = vec![true; outlines.len()];
-    for _ in 0..2 {
-        let before = patches.iter().any(|patch| !patch.splits.is_empty()).then(|| divided.clone());
-        let mut first: BTreeMap<usize, Patch> = BTreeMap::new();
-        rounds((known, outlines, options), divided, &mut patches, (&is_heard, &mut first));
-        let is_worse = |number: &usize, patch: &Patch| {
-            patches.get(*number).is_some_and(|now| patch.report.poor > 0 && now.report.poor >= patch.report.poor)
-        };
-        let worse: Vec<usize> = first.iter().filter(|(number, patch)| is_worse(number, patch)).map(|(number, _)| *number).collect();
-        let (Some(before), false) = (before, worse.is_empty()) else { break };
-        worse.into_iter().for_each(|number| is_heard.iter_mut().skip(number).take(1).for_each(|heard| *heard = false));
-        *divided = before;
+    if patches.iter().all(|patch| patch.splits.is_empty()) {
+        return patches;
+    }
+    let before = divided.clone();
+    let mut limits = vec![ROUNDS; outlines.len()];
+    for _ in 0..AGAIN {
+        let (first, best) = rounds((known, outlines, options), divided, &mut patches, &limits);
+        let mut is_any = false;
+        for ((patch, (fewest, at)), limit) in patches.iter().zip(best).zip(&mut limits) {
+            // One that has never become better is best before all rounds.
+            if at < *limit && (patch.report.poor > fewest || (at == 0 && fewest > 0)) {
+                (*limit, is_any) = (at, true);
+            }
+        }
+        if !is_any {
+            return patches;
+        }
+        divided.clone_from(&before);
         for (number, patch) in first {
             patches.iter_mut().skip(number).take(1).for_each(|old| old.clone_from(&patch));
         }
     }
+    rounds((known, outlines, options), divided, &mut patches, &limits);
     patches
 }
 
-/// Divides curves for the sake of outlines that are heard, and keeps the first patches of those that change.
+/// The first patches of outlines that have changed, and the fewest poor triangles of each outline with the round of that.
+type Rounds = (BTreeMap<usize, Patch>, Vec<(usize, u32)>);
+
+/// Divides curves for the sake of outlines, of each in so many rounds at most.
 fn rounds<'a>(
     (known, outlines, options): ((&'a Strands<'a>, &'a [Tried]), &'a [Outline], &'a Options),
     divided: &mut Divided,
     patches: &mut [Patch],
-    (is_heard, first): (&[bool], &mut BTreeMap<usize, Patch>),
-) {
-    // The fewest poor triangles of each outline so far, and the round of that.
+    limits: &[u32],
+) -> Rounds {
+    let mut first: BTreeMap<usize, Patch> = BTreeMap::new();
     let mut best: Vec<(usize, u32)> = patches.iter().map(|patch| (patch.report.poor, 0)).collect();
-    for round in 0..ROUNDS {
+    for round in 0..=ROUNDS {
         let mut splits: Vec<Split> = Vec::new();
-        for ((patch, (fewest, at)), is_heard) in patches.iter().zip(&mut best).zip(is_heard) {
+        for ((patch, (fewest, at)), limit) in patches.iter().zip(&mut best).zip(limits) {
             if patch.report.poor < *fewest {
                 (*fewest, *at) = (patch.report.poor, round);
             }
-            splits.extend(patch.splits.iter().filter(|_| *is_heard && round < *at + PATIENCE));
+            splits.extend(patch.splits.iter().filter(|_| round < (*limit).min(*at + PATIENCE)));
         }
         let touched = divided.split(known.0, outlines, splits);
         if touched.is_empty() {
-            return;
+            break;
         }
         let tasks = tasks(known, (outlines, &[]), options, divided, false);
         let again: Vec<(usize, Patch)> =
@@ -167,6 +179,7 @@ fn rounds<'a>(
             }
         }
     }
+    (first, best)
 }
 
 /// The task of each outline.

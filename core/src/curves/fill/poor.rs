@@ -16,6 +16,9 @@ const LEAST: f64 = 0.4;
 /// than the second have edges that are alike.
 const SHARP: [f64; 2] = [0.965_925_826, 0.642_787_61];
 
+/// First edges of a sharp corner may differ by this factor.
+const ALIKE: f64 = 1.2;
+
 /// A place where a curve is to be divided: its number, and the share of its length.
 pub(super) type Split = (usize, f64);
 
@@ -70,7 +73,7 @@ impl<'a> Angles<'a> {
     }
 
     /// Where to divide edges, given by their places in the direction of their ring: in the middle; those of a corner below 50° both, at the same
-    /// distance from it, and those of one below 15° nowhere. O(edges · rings).
+    /// distance from it, and those of one below 15° where that makes them alike. O(edges · rings).
     pub(super) fn wishes(&self, edges: &[[u32; 2]], lifted: &Lifted<'_>) -> Vec<Wish> {
         let mut wishes = Vec::new();
         for [from, to] in edges {
@@ -94,18 +97,20 @@ impl<'a> Angles<'a> {
                     wishes.push(([a, b], share));
                 }
             };
-            if low.max(high) > SHARP[0] {
-                continue;
-            }
             if low.max(high) <= SHARP[1] {
                 add(at, 0.5);
                 continue;
             }
-            // The edges before and behind the corner.
+            // The edges before and behind the corner, and how far from it they are to be divided.
             let (before, behind) = if low >= high { (at + count - 1, at) } else { (at, at + 1) };
-            let far = 0.5 * length(before).min(length(behind));
-            add(before, 1.0 - far / length(before));
-            add(behind, far / length(behind));
+            let shorter = length(before).min(length(behind));
+            let far = if low.max(high) > SHARP[0] { shorter } else { 0.5 * shorter };
+            if far < length(before) / ALIKE {
+                add(before, 1.0 - far / length(before));
+            }
+            if far < length(behind) / ALIKE {
+                add(behind, far / length(behind));
+            }
         }
         wishes
     }

@@ -200,15 +200,29 @@ impl State<'_, '_> {
                 let size = corners.into_iter().fold(self.longest, |most, corner| most.max(least(corner)));
                 if self.lifted.insert(inside, place, point, &mut self.changed) {
                     self.sizes.push(size);
+                } else if is_flat {
+                    self.block(None, triangle);
                 }
             }
-            Err(edge) if is_flat => {
-                let ends = edge.map(|edge| self.lifted.around(edge)).map(|[_, a, b]| [a, b]);
-                self.blocking.extend(ends);
-            }
+            Err(edge) if is_flat => self.block(edge, triangle),
             Err(_) => {}
         }
     }
+
+    /// Notes an edge of a ring that is in the way of a triangle, or if none is known, the longest one of it or beside it.
+    fn block(&mut self, edge: Option<u32>, triangle: u32) {
+        let lifted = &*self.lifted;
+        let own = |triangle: u32| 3 * triangle..3 * triangle + 3;
+        let beside = own(triangle).map(|edge| lifted.beyond(edge)).filter(|other| *other != NONE).flat_map(|other| own(other / 3));
+        let near = own(triangle).chain(beside).filter(|edge| lifted.beyond(*edge) == NONE);
+        let edge = edge.or_else(|| near.max_by(|a, b| length(lifted, *a).total_cmp(&length(lifted, *b))));
+        self.blocking.extend(edge.map(|edge| lifted.around(edge)).map(|[_, a, b]| [a, b]));
+    }
+}
+
+fn length(lifted: &Lifted<'_>, edge: u32) -> f64 {
+    let [_, a, b] = lifted.around(edge).map(|corner| lifted.point(corner));
+    distance(a, b)
 }
 
 /// Where a place goes: the triangle, the place, and its point; if others are nearer there than `clear`, the longest edge of a ring that is in the
@@ -227,22 +241,18 @@ fn settled(
             lifted.beyond(*edge) == NONE && norm(cross(sub(b, a), sub(point, a))) < least * dot(sub(b, a), sub(b, a))
         })
     };
-    let length = |edge: u32| {
-        let [_, a, b] = lifted.around(edge).map(|corner| lifted.point(corner));
-        distance(a, b)
-    };
     let edge = match end {
         End::At(edge) => Some(edge),
         End::In(triangle) => low(triangle, point, HEIGHTS[0]),
     };
     if let Some(edge) = edge {
-        let along = length(edge);
+        let along = length(lifted, edge);
         place = above(lifted, edge, HEIGHTS[1] * along).ok_or(edge)?;
         clear = APART * along;
         point = lifted.lift(place);
         end = lifted.walk(edge / 3, place).ok_or(edge)?;
     }
-    let longer = |other: u32| Some(edge.filter(|edge| length(*edge) >= length(other)).unwrap_or(other));
+    let longer = |other: u32| Some(edge.filter(|edge| length(lifted, *edge) >= length(lifted, other)).unwrap_or(other));
     let triangle = match end {
         End::In(triangle) => triangle,
         End::At(other) => return Err(longer(other)),

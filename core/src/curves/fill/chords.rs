@@ -1,7 +1,7 @@
 //! Edges that lie on each other in space, divided.
 //!
-//! A surface of revolution that is cut open has each point of the cut twice on its rim. Edges from both of them to one point are two on the map and one in
-//! space, and triangles between them lie on each other; with a point in the middle of each such edge, they do not. The same
+//! A surface of revolution that is cut open has each point of the cut twice on its rim. Edges from both of them to one point are two on the
+//! map and one in space, and triangles between them lie on each other; with a point in the middle of each such edge, they do not. The same
 //! holds of two outlines that share two curves, as the halves of a cone do: an edge from one of these to the other may be in both.
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -167,7 +167,8 @@ mod tests {
     /// Two halves of a cone, which share two straight lines, and the disc below: each edge of the mesh has one triangle on each side.
     #[test]
     fn halves_of_a_cone_share_no_chord() {
-        let half = |from: f64| Arc::new([0.0; 3], [[35.0, 0.0, 0.0], [0.0, 35.0, 0.0]], [from, from + std::f64::consts::PI]).unwrap();
+        let half =
+            |from: f64| Arc::new([0.0; 3], [[35.0, 0.0, 0.0], [0.0, 35.0, 0.0]], [from, from + std::f64::consts::PI]).unwrap();
         let line = |x: f64| Shape::Line([[x, 0.0, 0.0], [0.0, 0.0, 100.0]]);
         let shapes = [Shape::Arc(half(0.0)), Shape::Arc(half(std::f64::consts::PI)), line(35.0), line(-35.0)];
         let outline = |uses: &[(usize, bool)]| {

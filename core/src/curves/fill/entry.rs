@@ -93,7 +93,8 @@ pub fn fill_beside(
     let mut divided = network::divide(&strands, outlines, options, &[]);
     if options.size.is_none() {
         // Curves are divided as finely as their surfaces have to be, else triangles between both would be flat.
-        let dry: Vec<Patch> = tasks((&strands, &tried), (outlines, &[]), options, &divided, true).par_iter().map(Task::run).collect();
+        let dry: Vec<Patch> =
+            tasks((&strands, &tried), (outlines, &[]), options, &divided, true).par_iter().map(Task::run).collect();
         let longest: Vec<f64> = dry.iter().map(|patch| COARSER * patch.longest).collect();
         if network::is_coarser(&divided, &longest) {
             divided = network::divide(&strands, outlines, options, &longest);

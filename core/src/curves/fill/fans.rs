@@ -5,9 +5,8 @@
 
 use super::chart::Chart;
 use super::fan::{Fan, angle};
-use super::layout::{Corner, Layout, Rim};
+use super::layout::{Corner, Layout, Rim, Wish};
 use super::options::Options;
-use super::poor::Wish;
 use super::space;
 use super::strand::Strand;
 use crate::curves::Use;

@@ -4,7 +4,6 @@ use std::f64::consts::TAU;
 
 use super::carrier::Carrier;
 use super::chart::{Chart, Turned};
-use super::poor::Wish;
 use crate::curves::vector::{Point, add, scale};
 
 /// A point of an outline.
@@ -27,6 +26,9 @@ pub(super) enum Corner {
     Inner(u32),
 }
 
+/// An edge that is to be divided: its ends in the direction of its ring, and how far from the first one, in parts of its length.
+pub(super) type Wish = ([Corner; 2], f64);
+
 /// Rings of corners with their places on a chart: the first one anticlockwise, those of holes clockwise.
 #[derive(Clone, Debug)]
 pub(super) struct Layout {
@@ -39,7 +41,8 @@ pub(super) struct Layout {
 }
 
 impl Layout {
-    /// Divides edges of cuts, which are in rings once in each direction; whether any was. Both sides of a cut get the same point. O(places · log places).
+    /// Divides edges of cuts, which are in rings once in each direction; whether any was. Both sides of a cut get the same point.
+    /// O(places · log places + wishes²), where wishes are few.
     pub(super) fn divide(&mut self, wishes: &[Wish]) -> bool {
         if self.added.is_empty() {
             return false;

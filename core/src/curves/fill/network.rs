@@ -93,7 +93,9 @@ impl Divided {
         for (curve, share) in splits {
             let (Some(samples), Some(Some(strand))) = (self.curves.get_mut(curve), strands.get(curve)) else { continue };
             let at = samples.partition_point(|(other, _)| *other <= share);
-            let (Some((low, _)), Some((high, _))) = (at.checked_sub(1).and_then(|at| samples.get(at)), samples.get(at)) else { continue };
+            let (Some((low, _)), Some((high, _))) = (at.checked_sub(1).and_then(|at| samples.get(at)), samples.get(at)) else {
+                continue;
+            };
             // Two wishes for one edge differ where it begins a sharp corner: the second one is left to the next round.
             let is_new = is_divided.get(curve).is_some_and(|is_divided| !is_divided) || share - low > 0.2 * (high - low);
             if (share - low).min(high - share) < SHARE || !is_new {
@@ -107,7 +109,8 @@ impl Divided {
             let mut uses = std::iter::once(&outline.outer).chain(&outline.inner).flatten();
             uses.any(|one| is_divided.get(one.curve) == Some(&true))
         };
-        let touched: Vec<usize> = outlines.iter().enumerate().filter(|(_, outline)| has(outline)).map(|(number, _)| number).collect();
+        let touched: Vec<usize> =
+            outlines.iter().enumerate().filter(|(_, outline)| has(outline)).map(|(number, _)| number).collect();
         for number in &touched {
             let Some(rings) = outlines.get(*number).map(|outline| self.rings_of(outline)) else { continue };
             self.rings.iter_mut().skip(*number).take(1).for_each(|old| old.clone_from(&rings));

@@ -9,10 +9,10 @@ use super::coons::Coons;
 use super::fans;
 use super::fit::FitError;
 use super::improve::Improved;
-use super::layout::{self, Corner, Layout, Rim};
+use super::layout::{self, Corner, Layout, Rim, Wish};
 use super::lifted::Lifted;
 use super::options::{Options, Outline};
-use super::poor::{self, Angles, Split, Wish};
+use super::poor::{self, Angles, Split};
 use super::refine;
 use super::report::{Method, Problem, Report, Surface};
 use super::sides;
@@ -152,7 +152,14 @@ impl<'a> Task<'a> {
 
     fn fallback(&self, report: Report) -> Patch {
         let rings = self.rings.iter().map(|ring| ring.iter().map(|rim| rim.vertex).collect()).collect();
-        Patch { surface: Surface::Fallback(rings), report, points: Vec::new(), triangles: Vec::new(), longest: f64::INFINITY, splits: Vec::new() }
+        Patch {
+            surface: Surface::Fallback(rings),
+            report,
+            points: Vec::new(),
+            triangles: Vec::new(),
+            longest: f64::INFINITY,
+            splits: Vec::new(),
+        }
     }
 
     fn carrier(&self, probes: &[Point], tolerance: f64, report: &mut Report) -> Option<(Surface, Meshed)> {
@@ -206,7 +213,8 @@ impl<'a> Task<'a> {
     }
 
     fn coons(&self, curves: &Curves, corners: &[usize], report: &mut Report) -> Option<(Surface, Meshed)> {
-        let Unfolded { all, lengths, is_folded } = self.tried.coons.get_or_init(|| self.unfolded(curves, corners).unwrap_or_default());
+        let Unfolded { all, lengths, is_folded } =
+            self.tried.coons.get_or_init(|| self.unfolded(curves, corners).unwrap_or_default());
         report.is_folded = *is_folded;
         for (coons, longest) in all {
             // A dry run needs no outline on the map.

@@ -1,10 +1,11 @@
 //! Triangles that are not even because their outline is divided too coarsely for them, and where to divide it.
 //!
-//! Based on: J. Ruppert, *A Delaunay refinement algorithm for quality 2-dimensional mesh generation*, Journal of Algorithms 18 (1995): an edge of the
-//! outline that is in the way of a triangle's new corner is halved, and edges of a sharp corner stay alike, else each would make the other one shorter
-//! without end. Here outlines share their edges: all that are in the way are halved at once, for all outlines of a curve.
+//! Based on: J. Ruppert, *A Delaunay refinement algorithm for quality 2-dimensional mesh generation*, Journal of Algorithms 18 (1995): an
+//! edge of the outline that is in the way of a triangle's new corner is halved, and edges of a sharp corner stay alike, else each would
+//! make the other one shorter without end. Outlines share their edges here: all that are in the way are halved at once, for all
+//! outlines of a curve.
 
-use super::layout::{Corner, Rim};
+use super::layout::{Corner, Rim, Wish};
 use super::lifted::Lifted;
 use super::mesh::of_triangle;
 use super::options::Outline;
@@ -21,9 +22,6 @@ const ALIKE: f64 = 1.2;
 
 /// A place where a curve is to be divided: its number, and the share of its length.
 pub(super) type Split = (usize, f64);
-
-/// An edge that is to be divided: its ends in the direction of its ring, and how far from the first one, in parts of its length.
-pub(super) type Wish = ([Corner; 2], f64);
 
 /// Angles at the points of rings.
 #[derive(Debug)]
@@ -132,11 +130,53 @@ pub(super) fn splits(outline: &Outline, rings: &[Vec<Rim>], wishes: &[Wish]) -> 
         }
     }
     known.sort_by_key(|(ends, ..)| *ends);
-    let find = |ends: [u32; 2]| known.get(known.partition_point(|(other, ..)| *other < ends)).filter(|(other, ..)| *other == ends);
+    let find =
+        |ends: [u32; 2]| known.get(known.partition_point(|(other, ..)| *other < ends)).filter(|(other, ..)| *other == ends);
     let split = |(ends, share): &Wish| {
         let [Corner::Rim(a), Corner::Rim(b)] = *ends else { return None };
         let found = find([a, b]).map(|found| (found, *share)).or_else(|| find([b, a]).map(|found| (found, 1.0 - share)));
         found.map(|((_, to, rim, curve), share)| (*curve, rim.share + share * (to - rim.share)))
     };
     wishes.iter().filter_map(split).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeMap;
+
+    use super::*;
+    use crate::curves::Use;
+    use crate::curves::curve::Shape;
+    use crate::curves::fill::{Options, fill, quality};
+
+    /// A needle with a corner of 5.7°, whose long side is one of a larger triangle, too. Sides of the needle come near to each other, so they are
+    /// divided until all triangles but that of its corner are even, and the larger triangle has all points of the common side.
+    #[test]
+    fn sides_of_a_needle_are_divided_for_both_outlines() {
+        let [o, a, b, c] = [[0.0; 3], [10.0, 0.0, 0.0], [10.0, 1.0, 0.0], [0.0, 9.0, 0.0]];
+        let shapes = [[o, a], [a, b], [b, o], [b, c], [c, o]].map(Shape::Line);
+        let outline = |uses: &[(usize, bool)]| {
+            let outer = uses.iter().map(|&(curve, is_reversed)| Use { curve, is_reversed }).collect();
+            Outline { outer, inner: Vec::new() }
+        };
+        let outlines = [outline(&[(0, false), (1, false), (2, false)]), outline(&[(2, true), (3, false), (4, false)])];
+        let shapes: Vec<&Shape> = shapes.iter().collect();
+        let filled = fill(&shapes, &outlines, &Options::default()).unwrap();
+        let below = quality(&filled.mesh).iter().filter(|quality| **quality < LEAST).count();
+        let reports: Vec<[usize; 2]> = filled.reports.iter().map(|report| [report.sharp, report.poor]).collect();
+        assert_eq!((below, reports), (1, vec![[1, 0], [0, 0]]));
+        let mut edges: BTreeMap<(u32, u32), usize> = BTreeMap::new();
+        for [a, b, c] in &filled.mesh.triangles {
+            for (a, b) in [(a, b), (b, c), (c, a)] {
+                *edges.entry((*a.min(b), *a.max(b))).or_default() += 1;
+            }
+        }
+        let is_common = |number: u32| {
+            let [x, y, _] = filled.mesh.points[number as usize];
+            (y - 0.1 * x).abs() < 1e-9
+        };
+        let common: Vec<usize> =
+            edges.iter().filter(|((a, b), _)| is_common(*a) && is_common(*b)).map(|(_, count)| *count).collect();
+        assert!(common.len() > 11 && common.iter().all(|count| *count == 2), "{common:?}");
+    }
 }

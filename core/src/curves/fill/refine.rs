@@ -23,6 +23,8 @@ const HEIGHTS: [f64; 2] = [0.45, 0.7];
 const APART: f64 = 0.6;
 /// How much shorter edges may be at a distance from longer ones of rings, in parts of that.
 const DECAY: f64 = 0.35;
+/// Of two edges of rings that are in the way, one shorter than this part of the other is left.
+const SHORTER: f64 = 0.4;
 /// Passes over all triangles, at most.
 const PASSES: u32 = 4;
 /// The least distance of others, for a triangle that is too large, in parts of the largest radius.
@@ -92,6 +94,9 @@ fn sizes(lifted: &Lifted<'_>, longest: f64) -> Vec<f64> {
     }
     sizes
 }
+
+/// Edges of rings that are in the way of a place.
+type Blocking = [Option<u32>; 2];
 
 /// Measures of a triangle in space.
 #[derive(Clone, Copy, Debug)]
@@ -201,22 +206,28 @@ impl State<'_, '_> {
                 if self.lifted.insert(inside, place, point, &mut self.changed) {
                     self.sizes.push(size);
                 } else if is_flat {
-                    self.block(None, triangle);
+                    self.block([None; 2], triangle);
                 }
             }
-            Err(edge) if is_flat => self.block(edge, triangle),
+            Err(edges) if is_flat => self.block(edges, triangle),
             Err(_) => {}
         }
     }
 
-    /// Notes an edge of a ring that is in the way of a triangle, or if none is known, the longest one of it or beside it.
-    fn block(&mut self, edge: Option<u32>, triangle: u32) {
+    /// Notes the edges of rings that are in the way of a triangle but for one that is much shorter than the other, or if none is known, the
+    /// longest one of the triangle or beside it.
+    fn block(&mut self, edges: Blocking, triangle: u32) {
         let lifted = &*self.lifted;
-        let own = |triangle: u32| 3 * triangle..3 * triangle + 3;
-        let beside = own(triangle).map(|edge| lifted.beyond(edge)).filter(|other| *other != NONE).flat_map(|other| own(other / 3));
-        let near = own(triangle).chain(beside).filter(|edge| lifted.beyond(*edge) == NONE);
-        let edge = edge.or_else(|| near.max_by(|a, b| length(lifted, *a).total_cmp(&length(lifted, *b))));
-        self.blocking.extend(edge.map(|edge| lifted.around(edge)).map(|[_, a, b]| [a, b]));
+        let mut all: Vec<u32> = edges.into_iter().flatten().collect();
+        if all.is_empty() {
+            let own = |triangle: u32| 3 * triangle..3 * triangle + 3;
+            let beside = own(triangle).map(|edge| lifted.beyond(edge)).filter(|other| *other != NONE);
+            let near = own(triangle).chain(beside.flat_map(|other| own(other / 3))).filter(|edge| lifted.beyond(*edge) == NONE);
+            all.extend(near.max_by(|a, b| length(lifted, *a).total_cmp(&length(lifted, *b))));
+        }
+        let most = all.iter().map(|edge| length(lifted, *edge)).fold(0.0, f64::max);
+        all.retain(|edge| length(lifted, *edge) >= SHORTER * most);
+        self.blocking.extend(all.into_iter().map(|edge| lifted.around(edge)).map(|[_, a, b]| [a, b]));
     }
 }
 
@@ -225,15 +236,10 @@ fn length(lifted: &Lifted<'_>, edge: u32) -> f64 {
     distance(a, b)
 }
 
-/// Where a place goes: the triangle, the place, and its point; if others are nearer there than `clear`, the longest edge of a ring that is in the
-/// way, if one is.
-fn settled(
-    lifted: &Lifted<'_>,
-    from: u32,
-    mut place: [f64; 2],
-    mut clear: f64,
-) -> Result<(u32, [f64; 2], Point), Option<u32>> {
-    let mut end = lifted.walk(from, place).ok_or(None)?;
+/// Where a place goes: the triangle, the place, and its point; if others are nearer there than `clear`, the edges of rings that are in
+/// the way.
+fn settled(lifted: &Lifted<'_>, from: u32, mut place: [f64; 2], mut clear: f64) -> Result<(u32, [f64; 2], Point), Blocking> {
+    let mut end = lifted.walk(from, place).ok_or([None; 2])?;
     let mut point = lifted.lift(place);
     let low = |triangle: u32, point: Point, least: f64| {
         (3 * triangle..3 * triangle + 3).find(|edge| {
@@ -247,24 +253,23 @@ fn settled(
     };
     if let Some(edge) = edge {
         let along = length(lifted, edge);
-        place = above(lifted, edge, HEIGHTS[1] * along).ok_or(edge)?;
+        place = above(lifted, edge, HEIGHTS[1] * along).ok_or([Some(edge), None])?;
         clear = APART * along;
         point = lifted.lift(place);
-        end = lifted.walk(edge / 3, place).ok_or(edge)?;
+        end = lifted.walk(edge / 3, place).ok_or([Some(edge), None])?;
     }
-    let longer = |other: u32| Some(edge.filter(|edge| length(lifted, *edge) >= length(lifted, other)).unwrap_or(other));
     let triangle = match end {
         End::In(triangle) => triangle,
-        End::At(other) => return Err(longer(other)),
+        End::At(other) => return Err([edge, Some(other)]),
     };
     let is_clear = |corner: u32| distance(lifted.point(corner), point) >= clear;
     let across = |edge: u32| Some(lifted.beyond(edge)).filter(|other| *other != NONE).map(|other| lifted.around(other)[0]);
-    let is_free = lifted.corners(triangle).into_iter().all(is_clear)
-        && (3 * triangle..3 * triangle + 3).filter_map(across).all(is_clear);
+    let is_free =
+        lifted.corners(triangle).into_iter().all(is_clear) && (3 * triangle..3 * triangle + 3).filter_map(across).all(is_clear);
     match low(triangle, point, 0.9 * HEIGHTS[0]) {
-        Some(other) => Err(longer(other)),
+        Some(other) => Err([edge, Some(other)]),
         None if is_free => Ok((triangle, place, point)),
-        None => Err(edge),
+        None => Err([edge, None]),
     }
 }
 

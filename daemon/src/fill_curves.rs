@@ -264,6 +264,7 @@ fn as_json(args: &FillCurvesArgs, done: &Done) -> Value {
             "gap": report.gap,
             "tangent": report.tangent,
             "kink": report.kink,
+            "triangles_below_0_4": json!({ "at_corners_below_15_degrees": report.sharp, "elsewhere": report.poor }),
             "folded": report.is_folded,
             "ambiguous": report.is_ambiguous,
             "problem": report.problem.as_ref().map(ToString::to_string),

@@ -1,13 +1,17 @@
 //! Outlines filled: the way in.
 
+use std::collections::BTreeMap;
+
 use rayon::prelude::*;
 
+use super::chords::{self, Chord};
 use super::layout::Corner;
 use super::mesh::Mesh;
 use super::network::{self, Divided, Strands};
 use super::options::{Continuity, Options, Outline};
 use super::orient;
 use super::patch::{Patch, Task, Tried};
+use super::poor::Split;
 use super::report::{Report, Surface};
 use super::strand::Strand;
 use super::tangent::{self, Beside};
@@ -16,6 +20,14 @@ use crate::curves::vector::Point;
 
 /// Edges of curves may be longer than those within by this factor.
 const COARSER: f64 = 1.3;
+
+/// Rounds in which curves are divided for the sake of triangles, at most.
+const ROUNDS: u32 = 24;
+
+/// Times that all rounds are done again, at most.
+const AGAIN: u32 = 3;
+/// An outline whose triangles have not become better in so many rounds is too narrow to be divided.
+const PATIENCE: u32 = 6;
 
 /// Filled outlines.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -86,31 +98,107 @@ fn made(shapes: &[&Shape], outlines: &[Outline], beside: &[Beside<'_>], options:
     let mut divided = network::divide(&strands, outlines, options, &[]);
     if options.size.is_none() {
         // Curves are divided as finely as their surfaces have to be, else triangles between both would be flat.
-        let dry: Vec<Patch> = tasks((&strands, &tried), outlines, options, &divided, true).par_iter().map(Task::run).collect();
+        let dry: Vec<Patch> =
+            tasks((&strands, &tried), (outlines, &[]), options, &divided, true).par_iter().map(Task::run).collect();
         let longest: Vec<f64> = dry.iter().map(|patch| COARSER * patch.longest).collect();
         if network::is_coarser(&divided, &longest) {
             divided = network::divide(&strands, outlines, options, &longest);
         }
     }
-    let tasks = tasks((&strands, &tried), outlines, options, &divided, false);
-    let mut patches: Vec<Patch> = tasks.par_iter().map(Task::run).collect();
+    let mut patches = evened((&strands, &tried), outlines, options, &mut divided);
+    let meshes: Vec<&[[Corner; 3]]> = patches.iter().map(|patch| patch.triangles.as_slice()).collect();
+    let chords = chords::shared(&meshes, divided.curves.par_iter().map(Vec::as_slice));
+    let tasks = tasks((&strands, &tried), (outlines, &chords), options, &divided, false);
+    patches.par_iter_mut().zip(&tasks).filter(|(_, task)| !task.chords.is_empty()).for_each(|(patch, task)| *patch = task.run());
     if options.continuity == Continuity::Tangent {
         tangent::bend(&tasks, &mut patches, beside);
     }
     collected(divided.points, patches, (strands, outlines))
 }
 
+/// Patches of outlines, whose curves are divided until triangles are even or for so many rounds. If some outlines were better before, all is done
+/// again, and these wish nothing after the round in which they were best: it only makes those beside them finer.
+fn evened<'a>(
+    known: (&'a Strands<'a>, &'a [Tried]),
+    outlines: &'a [Outline],
+    options: &'a Options,
+    divided: &mut Divided,
+) -> Vec<Patch> {
+    let mut patches: Vec<Patch> = tasks(known, (outlines, &[]), options, divided, false).par_iter().map(Task::run).collect();
+    if patches.iter().all(|patch| patch.splits.is_empty()) {
+        return patches;
+    }
+    let before = divided.clone();
+    let mut limits = vec![ROUNDS; outlines.len()];
+    for _ in 0..AGAIN {
+        let (first, best) = rounds((known, outlines, options), divided, &mut patches, &limits);
+        let mut is_any = false;
+        for ((patch, (fewest, at)), limit) in patches.iter().zip(best).zip(&mut limits) {
+            // One that has never become better is best before all rounds.
+            if at < *limit && (patch.report.poor > fewest || (at == 0 && fewest > 0)) {
+                (*limit, is_any) = (at, true);
+            }
+        }
+        if !is_any {
+            return patches;
+        }
+        divided.clone_from(&before);
+        for (number, patch) in first {
+            patches.iter_mut().skip(number).take(1).for_each(|old| old.clone_from(&patch));
+        }
+    }
+    rounds((known, outlines, options), divided, &mut patches, &limits);
+    patches
+}
+
+/// The first patches of outlines that have changed, and the fewest poor triangles of each outline with the round of that.
+type Rounds = (BTreeMap<usize, Patch>, Vec<(usize, u32)>);
+
+/// Divides curves for the sake of outlines, of each in so many rounds at most.
+fn rounds<'a>(
+    (known, outlines, options): ((&'a Strands<'a>, &'a [Tried]), &'a [Outline], &'a Options),
+    divided: &mut Divided,
+    patches: &mut [Patch],
+    limits: &[u32],
+) -> Rounds {
+    let mut first: BTreeMap<usize, Patch> = BTreeMap::new();
+    let mut best: Vec<(usize, u32)> = patches.iter().map(|patch| (patch.report.poor, 0)).collect();
+    for round in 0..=ROUNDS {
+        let mut splits: Vec<Split> = Vec::new();
+        for ((patch, (fewest, at)), limit) in patches.iter().zip(&mut best).zip(limits) {
+            if patch.report.poor < *fewest {
+                (*fewest, *at) = (patch.report.poor, round);
+            }
+            splits.extend(patch.splits.iter().filter(|_| round < (*limit).min(*at + PATIENCE)));
+        }
+        let touched = divided.split(known.0, outlines, splits);
+        if touched.is_empty() {
+            break;
+        }
+        let tasks = tasks(known, (outlines, &[]), options, divided, false);
+        let again: Vec<(usize, Patch)> =
+            touched.into_par_iter().filter_map(|number| Some((number, tasks.get(number)?.run()))).collect();
+        for (number, patch) in again {
+            if let Some(old) = patches.get_mut(number) {
+                let old = std::mem::replace(old, patch);
+                first.entry(number).or_insert(old);
+            }
+        }
+    }
+    (first, best)
+}
+
 /// The task of each outline.
 fn tasks<'a>(
     (strands, tried): (&'a Strands<'a>, &'a [Tried]),
-    outlines: &'a [Outline],
+    (outlines, chords): (&'a [Outline], &'a [Vec<Chord>]),
     options: &'a Options,
     divided: &'a Divided,
     is_dry: bool,
 ) -> Vec<Task<'a>> {
     let wanted = divided.rings.iter().zip(&divided.wanted);
-    let all = outlines.iter().zip(tried).zip(wanted);
-    all.map(|((outline, tried), (rings, &(longest, chord)))| Task {
+    let all = outlines.iter().zip(tried).zip(wanted).enumerate();
+    all.map(|(number, ((outline, tried), (rings, &(longest, chord))))| Task {
         outline,
         strands,
         rings,
@@ -119,6 +207,7 @@ fn tasks<'a>(
         chord,
         is_dry,
         tried,
+        chords: chords.get(number).map_or(&[], Vec::as_slice),
     })
     .collect()
 }

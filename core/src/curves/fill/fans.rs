@@ -5,7 +5,7 @@
 
 use super::chart::Chart;
 use super::fan::{Fan, angle};
-use super::layout::{Corner, Layout, Rim};
+use super::layout::{Corner, Layout, Rim, Wish};
 use super::options::Options;
 use super::space;
 use super::strand::Strand;
@@ -17,8 +17,10 @@ use crate::curves::vector::{Point, between, distance};
 const WIDEST: f64 = 2.0;
 /// Samples of a curve that is alone.
 const SAMPLES: u32 = 64;
-/// Edges of a spoke, at most.
+/// Edges of a spoke, at most at first.
 const MOST: f64 = 64.0;
+/// Points of a spoke are no nearer to each other, in parts of its length.
+const LEAST: f64 = 1.0 / 2048.0;
 
 /// The mean of the ends and middles of curves, and of 64 points of one alone.
 pub(super) fn centre(parts: &[(&Strand<'_>, Use)]) -> Point {
@@ -56,46 +58,67 @@ pub(super) fn parts(ring: &[Rim], centre: Point) -> Vec<[usize; 2]> {
     parts
 }
 
+/// Shares of each spoke at which it has points, from the centre outwards and without both ends: edges of spokes are as long as those of the ring in
+/// the mean, and all spokes have no more than about `inner` points.
+pub(super) fn even(ring: &[Rim], centre: Point, inner: usize) -> Vec<Vec<f64>> {
+    let next = ring.iter().cycle().skip(1);
+    let around: f64 = ring.iter().zip(next).map(|(a, b)| distance(a.point, b.point)).sum();
+    let curves = ring.last().map_or(1, |rim| rim.part as usize + 1);
+    let most = (inner as f64 / curves as f64).clamp(1.0, MOST);
+    let edge = around / ring.len().max(1) as f64;
+    let spoke = |rim: &Rim| {
+        let steps = (distance(rim.point, centre) / edge).round().clamp(1.0, most) as u32;
+        (1..steps).map(|step| f64::from(step) / f64::from(steps)).collect()
+    };
+    ring.iter().map(spoke).collect()
+}
+
+/// Shares of each spoke in order, those of two parts that wish the same once, and none too near to another one.
+pub(super) fn merge(shares: &mut [Vec<f64>]) {
+    for spoke in shares {
+        spoke.sort_by(f64::total_cmp);
+        spoke.dedup_by(|a, b| *a - *b < LEAST);
+    }
+}
+
 /// The centre, the points of spokes, and the triangles of parts so far.
 pub(super) struct Spokes<'a> {
     ring: &'a [Rim],
     centre: Point,
-    /// For each point of the ring, so many edges its spoke has, and the number of its first point; none before it is needed.
-    spokes: Vec<Option<(u32, u32)>>,
-    edge: f64,
-    most: f64,
+    /// For each point of the ring, the shares of its spoke that have points.
+    shares: &'a [Vec<f64>],
+    /// The number of the first one; none before it is needed.
+    firsts: Vec<Option<u32>>,
     /// The centre, and points of spokes and within parts.
     pub(super) points: Vec<Point>,
     pub(super) triangles: Vec<[Corner; 3]>,
 }
 
 impl<'a> Spokes<'a> {
-    /// Edges of spokes are as long as those of the ring in the mean, and all spokes have no more than about `inner` points.
-    pub(super) fn new(ring: &'a [Rim], centre: Point, inner: usize) -> Self {
-        let next = ring.iter().cycle().skip(1);
-        let around: f64 = ring.iter().zip(next).map(|(a, b)| distance(a.point, b.point)).sum();
-        let curves = ring.last().map_or(1, |rim| rim.part as usize + 1);
-        let most = (inner as f64 / curves as f64).clamp(1.0, MOST);
-        let edge = around / ring.len().max(1) as f64;
-        Self { ring, centre, spokes: vec![None; ring.len()], edge, most, points: vec![centre], triangles: Vec::new() }
+    pub(super) fn new(ring: &'a [Rim], centre: Point, shares: &'a [Vec<f64>]) -> Self {
+        Self { ring, centre, shares, firsts: vec![None; ring.len()], points: vec![centre], triangles: Vec::new() }
     }
 
     fn rim(&self, at: usize) -> Option<Rim> {
         self.ring.get(at % self.ring.len().max(1)).copied()
     }
 
+    fn shares(&self, at: usize) -> &'a [f64] {
+        self.shares.get(at % self.ring.len().max(1)).map_or(&[], Vec::as_slice)
+    }
+
     /// Numbers of the points of a spoke, from the centre outwards, without both ends.
     fn spoke(&mut self, at: usize) -> std::ops::Range<u32> {
-        let (Some(rim), Some(known)) = (self.rim(at), self.spokes.get(at % self.ring.len().max(1)).copied()) else { return 0..0 };
-        let (steps, first) = known.unwrap_or_else(|| {
-            let steps = (distance(rim.point, self.centre) / self.edge).round().clamp(1.0, self.most) as u32;
-            let first = self.points.len() as u32;
-            self.points.extend((1..steps).map(|step| between(self.centre, rim.point, f64::from(step) / f64::from(steps))));
-            (steps, first)
-        });
         let place = at % self.ring.len().max(1);
-        self.spokes.iter_mut().skip(place).take(1).for_each(|spoke| *spoke = Some((steps, first)));
-        first..first + steps - 1
+        let (Some(rim), Some(known)) = (self.rim(at), self.firsts.get(place).copied()) else { return 0..0 };
+        let shares = self.shares(at);
+        let first = known.unwrap_or_else(|| {
+            let first = self.points.len() as u32;
+            self.points.extend(shares.iter().map(|share| between(self.centre, rim.point, *share)));
+            first
+        });
+        self.firsts.iter_mut().skip(place).take(1).for_each(|known| *known = Some(first));
+        first..first + shares.len() as u32
     }
 
     /// Numbers among all points of those that a part has for its own first ones.
@@ -110,18 +133,45 @@ impl<'a> Spokes<'a> {
         let rims: Vec<Rim> = (first..=last).filter_map(|at| self.rim(at)).collect();
         let fan = Fan::new(self.centre, rims.iter().map(|rim| rim.point).collect());
         let shared = self.shared(part);
-        let along = self.spoke(first).len();
-        let count = shared.len() - 1 - along;
+        let (out, back) = (self.shares(first), self.shares(last));
         let on = |number: usize, share: f64| fan.place(number).map(|x| x * share);
+        let inner = |number: usize| Corner::Inner(number as u32);
         let mut ring = vec![(Corner::Inner(0), [0.0; 2])];
-        ring.extend((1..=along).map(|step| (Corner::Inner(step as u32), on(0, step as f64 / (along + 1) as f64))));
+        ring.extend(out.iter().enumerate().map(|(step, share)| (inner(1 + step), on(0, *share))));
         ring.extend(rims.iter().enumerate().map(|(number, rim)| (Corner::Rim(rim.vertex), fan.place(number))));
         let end = rims.len() - 1;
-        ring.extend(
-            (1..=count).rev().map(|step| (Corner::Inner((along + step) as u32), on(end, step as f64 / (count + 1) as f64))),
-        );
+        ring.extend(back.iter().enumerate().rev().map(|(step, share)| (inner(1 + out.len() + step), on(end, *share))));
         let added = shared.iter().filter_map(|number| self.points.get(*number as usize)).copied().collect();
         (Layout { chart: Chart::Fan(Box::new(fan)), rings: vec![ring], added, is_mirrored: false }, rims)
+    }
+
+    /// Adds the shares at which a part wishes its spokes to be divided; whether there are any.
+    pub(super) fn divide(&self, [first, last]: &[usize; 2], wishes: &[Wish], shares: &mut [Vec<f64>]) -> bool {
+        let (out, back) = (self.shares(*first), self.shares(*last));
+        // Places of both spokes along the ring of the part: outwards from 0 to 1, and back from 1 to 2 at the centre.
+        let place = |corner: Corner, is_end: bool| match corner {
+            Corner::Inner(0) => Some(if is_end { 2.0 } else { 0.0 }),
+            Corner::Inner(number) => {
+                let at = number as usize - 1;
+                out.get(at).copied().or_else(|| back.get(at - out.len()).map(|share| 2.0 - share))
+            }
+            Corner::Rim(vertex) => {
+                let is = |at: usize| self.rim(at).is_some_and(|rim| rim.vertex == vertex);
+                (is(*first) || is(*last)).then_some(1.0)
+            }
+        };
+        let mut is_any = false;
+        for ([a, b], share) in wishes {
+            let is_spoke = !matches!((a, b), (Corner::Rim(_), Corner::Rim(_)));
+            let (Some(from), Some(to)) = (place(*a, false), place(*b, true)) else { continue };
+            let at = from + share * (to - from);
+            if is_spoke && at > 0.0 && at < 2.0 {
+                let (spoke, share) = if at < 1.0 { (*first, at) } else { (*last, 2.0 - at) };
+                shares.iter_mut().skip(spoke % self.ring.len().max(1)).take(1).for_each(|own| own.push(share));
+                is_any = true;
+            }
+        }
+        is_any
     }
 
     /// Takes over the triangles of a part.

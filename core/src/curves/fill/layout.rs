@@ -18,13 +18,16 @@ pub(super) struct Rim {
 }
 
 /// A corner of the mesh.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Corner {
     /// On the outline, by its number in the mesh.
     Rim(u32),
     /// Within, by its number among the added points.
     Inner(u32),
 }
+
+/// An edge that is to be divided: its ends in the direction of its ring, and how far from the first one, in parts of its length.
+pub(super) type Wish = ([Corner; 2], f64);
 
 /// Rings of corners with their places on a chart: the first one anticlockwise, those of holes clockwise.
 #[derive(Clone, Debug)]
@@ -35,6 +38,50 @@ pub(super) struct Layout {
     pub(super) added: Vec<Point>,
     /// Whether the outer ring runs clockwise as it is given, so that the chart was mirrored.
     pub(super) is_mirrored: bool,
+}
+
+impl Layout {
+    /// Divides edges of cuts, which are in rings once in each direction; whether any was. Both sides of a cut get the same point.
+    /// O(places · log places + wishes²), where wishes are few.
+    pub(super) fn divide(&mut self, wishes: &[Wish]) -> bool {
+        if self.added.is_empty() {
+            return false;
+        }
+        let mut known: Vec<([Corner; 2], usize, usize)> = Vec::new();
+        for (number, ring) in self.rings.iter().enumerate() {
+            let next = ring.iter().cycle().skip(1);
+            known.extend(ring.iter().zip(next).enumerate().map(|(at, ((a, _), (b, _)))| ([*a, *b], number, at)));
+        }
+        known.sort_unstable();
+        let find = |ends: [Corner; 2]| {
+            let from = known.partition_point(|(other, ..)| *other < ends);
+            known.get(from).filter(|(other, ..)| *other == ends).map(|(_, ring, at)| (*ring, *at))
+        };
+        let mut new: Vec<((usize, usize), (Corner, [f64; 2]))> = Vec::new();
+        for (ends, share) in wishes {
+            let [a, b] = *ends;
+            let (Some(there), Some(back)) = (find([a, b]), find([b, a])) else { continue };
+            if new.iter().any(|(at, _)| *at == there) {
+                continue;
+            }
+            let between = |(ring, at): (usize, usize), share: f64| {
+                let ring = self.rings.get(ring)?;
+                let ((_, p), (_, q)) = (ring.get(at)?, ring.get((at + 1) % ring.len())?);
+                Some([p[0] + share * (q[0] - p[0]), p[1] + share * (q[1] - p[1])])
+            };
+            let (Some(place), Some(other)) = (between(there, *share), between(back, 1.0 - share)) else { continue };
+            let corner = Corner::Inner(self.added.len() as u32);
+            self.added.push(self.chart.point(place));
+            new.extend([(there, (corner, place)), (back, (corner, other))]);
+        }
+        new.sort_by_key(|(at, _)| std::cmp::Reverse(*at));
+        for ((ring, at), entry) in &new {
+            if let Some(ring) = self.rings.get_mut(*ring) {
+                ring.insert(at + 1, *entry);
+            }
+        }
+        !new.is_empty()
+    }
 }
 
 /// Twice the area within a ring.

@@ -34,6 +34,7 @@ mod orient;
 mod patch;
 mod pieces;
 mod plate;
+mod poor;
 mod refine;
 mod report;
 mod revolved;

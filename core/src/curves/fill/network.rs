@@ -5,6 +5,7 @@ use rayon::prelude::*;
 use super::grade;
 use super::layout::Rim;
 use super::options::{Options, Outline};
+use super::poor::Split;
 use super::space;
 use super::strand::{Limits, Strand};
 use crate::curves::Use;
@@ -14,7 +15,7 @@ use crate::curves::vector::{Point, distance};
 pub(super) type Strands<'a> = Vec<Option<Strand<'a>>>;
 
 /// Points of the mesh on curves.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Divided {
     /// All of them.
     pub(super) points: Vec<Point>,
@@ -22,6 +23,8 @@ pub(super) struct Divided {
     pub(super) rings: Vec<Vec<Vec<Rim>>>,
     /// The longest edge and the tolerance of each outline.
     pub(super) wanted: Vec<(f64, f64)>,
+    /// Points of each curve.
+    pub(super) curves: Vec<Samples>,
 }
 
 /// Parameters and numbers of the points of a curve.
@@ -69,10 +72,51 @@ pub(super) fn divide(strands: &Strands<'_>, outlines: &[Outline], options: &Opti
         }
         curves.push(points);
     }
-    let ring = |uses: &Vec<Use>| ring(uses, &curves, &divided.points);
-    divided.rings =
-        outlines.par_iter().map(|outline| std::iter::once(&outline.outer).chain(&outline.inner).map(ring).collect()).collect();
+    divided.curves = curves;
+    divided.rings = outlines.par_iter().map(|outline| divided.rings_of(outline)).collect();
     divided
+}
+
+/// An edge is not divided below this part of its curve's length.
+const SHARE: f64 = 1.0 / 2048.0;
+
+impl Divided {
+    fn rings_of(&self, outline: &Outline) -> Vec<Vec<Rim>> {
+        std::iter::once(&outline.outer).chain(&outline.inner).map(|uses| ring(uses, &self.curves, &self.points)).collect()
+    }
+
+    /// Divides curves at shares of them, and gives the numbers of the outlines that have these. A place too near to another one is left out. Points that
+    /// are there keep their numbers. O(uses + places · points of a curve).
+    pub(super) fn split(&mut self, strands: &Strands<'_>, outlines: &[Outline], mut splits: Vec<Split>) -> Vec<usize> {
+        splits.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
+        let mut is_divided = vec![false; strands.len()];
+        for (curve, share) in splits {
+            let (Some(samples), Some(Some(strand))) = (self.curves.get_mut(curve), strands.get(curve)) else { continue };
+            let at = samples.partition_point(|(other, _)| *other <= share);
+            let (Some((low, _)), Some((high, _))) = (at.checked_sub(1).and_then(|at| samples.get(at)), samples.get(at)) else {
+                continue;
+            };
+            // Two wishes for one edge differ where it begins a sharp corner: the second one is left to the next round.
+            let is_new = is_divided.get(curve).is_some_and(|is_divided| !is_divided) || share - low > 0.2 * (high - low);
+            if (share - low).min(high - share) < SHARE || !is_new {
+                continue;
+            }
+            samples.insert(at, (share, self.points.len() as u32));
+            self.points.push(strand.point(share));
+            is_divided.iter_mut().skip(curve).take(1).for_each(|is_divided| *is_divided = true);
+        }
+        let has = |outline: &Outline| {
+            let mut uses = std::iter::once(&outline.outer).chain(&outline.inner).flatten();
+            uses.any(|one| is_divided.get(one.curve) == Some(&true))
+        };
+        let touched: Vec<usize> =
+            outlines.iter().enumerate().filter(|(_, outline)| has(outline)).map(|(number, _)| number).collect();
+        for number in &touched {
+            let Some(rings) = outlines.get(*number).map(|outline| self.rings_of(outline)) else { continue };
+            self.rings.iter_mut().skip(*number).take(1).for_each(|old| old.clone_from(&rings));
+        }
+        touched
+    }
 }
 
 /// Whether any ring has an edge longer than the entry of its outline.

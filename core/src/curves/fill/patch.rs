@@ -4,14 +4,15 @@ use std::sync::OnceLock;
 
 use super::blend::{self, Curves};
 use super::carrier::{self, Carrier};
-use super::chords;
+use super::chords::{self, Chord};
 use super::coons::Coons;
 use super::fans;
 use super::fit::FitError;
 use super::improve::Improved;
-use super::layout::{self, Corner, Layout, Rim};
+use super::layout::{self, Corner, Layout, Rim, Wish};
 use super::lifted::Lifted;
 use super::options::{Options, Outline};
+use super::poor::{self, Angles, Split};
 use super::refine;
 use super::report::{Method, Problem, Report, Surface};
 use super::sides;
@@ -27,6 +28,8 @@ const GAP: f64 = 3e-5;
 /// Products of points within and on outlines that heights may cost.
 const COSTLIEST: f64 = 1e8;
 
+/// Rounds in which cuts are divided, at most.
+const CUTS: u32 = 12;
 /// Parameters each way at which a surface is looked at again.
 const FINER: u32 = 64;
 
@@ -43,6 +46,19 @@ pub(super) struct Task<'a> {
     /// Whether the length of edges that the surface wants is all that is asked for: nothing is meshed then, and no heights are made.
     pub(super) is_dry: bool,
     pub(super) tried: &'a Tried,
+    /// Edges that other outlines have too.
+    pub(super) chords: &'a [Chord],
+}
+
+/// Coons surfaces of an outline.
+#[derive(Debug, Default)]
+struct Unfolded {
+    /// Coons surfaces that do not fold, each with the longest edge that it allows.
+    all: Vec<(Coons, f64)>,
+    /// The lengths of their sides.
+    lengths: Vec<f64>,
+    /// Whether one of those that were made folds.
+    is_folded: bool,
 }
 
 /// Surfaces of an outline that do not depend on how its curves are divided, made when they are first asked for.
@@ -50,8 +66,7 @@ pub(super) struct Task<'a> {
 pub(super) struct Tried {
     plane: OnceLock<Option<Carrier>>,
     carriers: OnceLock<Vec<Carrier>>,
-    /// Coons surfaces that do not fold, the lengths of their sides, and whether one of those that were made folds.
-    coons: OnceLock<(Vec<Coons>, Vec<f64>, bool)>,
+    coons: OnceLock<Unfolded>,
 }
 
 /// The surface of an outline and its triangles.
@@ -63,14 +78,22 @@ pub(super) struct Patch {
     pub(super) triangles: Vec<[Corner; 3]>,
     /// The longest edge that the surface allows.
     pub(super) longest: f64,
+    /// Where its curves are to be divided so that its triangles become even.
+    pub(super) splits: Vec<Split>,
 }
 
 /// Points within, triangles, and the longest edge that the surface allows.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 struct Meshed {
     points: Vec<Point>,
     triangles: Vec<[Corner; 3]>,
     longest: f64,
+    /// Triangles below 0.4: at corners of the outline below 15°, and elsewhere.
+    poor: [usize; 2],
+    /// Where to divide edges of rings for the sake of those elsewhere.
+    wishes: Vec<Wish>,
+    /// Whether there are wishes for spokes.
+    is_cut: bool,
     /// Whether triangles beside each other face away from each other.
     turns_back: bool,
 }
@@ -80,6 +103,13 @@ impl<'a> Task<'a> {
         let strands = self.strands;
         let all = std::iter::once(&self.outline.outer).chain(&self.outline.inner).flatten();
         all.filter_map(move |one| strands.get(one.curve).and_then(Option::as_ref).map(|strand| (strand, *one)))
+    }
+
+    fn patch(&self, surface: Surface, mut report: Report, meshed: Meshed) -> Patch {
+        let Meshed { points, triangles, longest, poor, wishes, .. } = meshed;
+        [report.sharp, report.poor] = poor;
+        let splits = if wishes.is_empty() { Vec::new() } else { poor::splits(self.outline, self.rings, &wishes) };
+        Patch { surface, report, points, triangles, longest, splits }
     }
 
     /// Fills it.
@@ -100,6 +130,8 @@ impl<'a> Task<'a> {
             is_folded: false,
             is_ambiguous: self.is_ambiguous(),
             is_flipped: false,
+            sharp: 0,
+            poor: 0,
             problem: None,
         };
         if self.rings.first().is_none_or(|ring| ring.len() < 3) {
@@ -111,16 +143,23 @@ impl<'a> Task<'a> {
             return self.fallback(report);
         }
         let tolerance = self.options.carrier.unwrap_or(1e-5 * size).max(report.gap.min(GAP * size));
-        let patch = self.carrier(&probes, tolerance, &mut report).or_else(|| self.blended(cosines, &corners, &mut report));
-        match patch {
-            Some((surface, Meshed { points, triangles, longest, .. })) => Patch { surface, report, points, triangles, longest },
+        let found = self.carrier(&probes, tolerance, &mut report).or_else(|| self.blended(cosines, &corners, &mut report));
+        match found {
+            Some((surface, meshed)) => self.patch(surface, report, meshed),
             None => self.fallback(report),
         }
     }
 
     fn fallback(&self, report: Report) -> Patch {
         let rings = self.rings.iter().map(|ring| ring.iter().map(|rim| rim.vertex).collect()).collect();
-        Patch { surface: Surface::Fallback(rings), report, points: Vec::new(), triangles: Vec::new(), longest: f64::INFINITY }
+        Patch {
+            surface: Surface::Fallback(rings),
+            report,
+            points: Vec::new(),
+            triangles: Vec::new(),
+            longest: f64::INFINITY,
+            splits: Vec::new(),
+        }
     }
 
     fn carrier(&self, probes: &[Point], tolerance: f64, report: &mut Report) -> Option<(Surface, Meshed)> {
@@ -174,11 +213,17 @@ impl<'a> Task<'a> {
     }
 
     fn coons(&self, curves: &Curves, corners: &[usize], report: &mut Report) -> Option<(Surface, Meshed)> {
-        let (all, lengths, is_folded) = self.tried.coons.get_or_init(|| self.unfolded(curves, corners).unwrap_or_default());
+        let Unfolded { all, lengths, is_folded } =
+            self.tried.coons.get_or_init(|| self.unfolded(curves, corners).unwrap_or_default());
         report.is_folded = *is_folded;
-        for coons in all {
-            let layout = blend::laid(coons.clone(), lengths, self.rings.first()?);
-            let Some(meshed) = self.mesh(layout) else { continue };
+        for (coons, longest) in all {
+            // A dry run needs no outline on the map.
+            let meshed = if self.is_dry {
+                Some(Meshed { longest: self.longest.min(*longest), ..Meshed::default() })
+            } else {
+                self.mesh_within(blend::laid(coons.clone(), lengths, self.rings.first()?), *longest, self.most())
+            };
+            let Some(meshed) = meshed else { continue };
             // Triangles that turn back are evidence enough for a closer look.
             if meshed.turns_back && coons.is_folded(FINER) {
                 report.is_folded = true;
@@ -195,7 +240,7 @@ impl<'a> Task<'a> {
     }
 
     /// Coons surfaces that do not fold, the one upon a surface of revolution first.
-    fn unfolded(&self, curves: &Curves, corners: &[usize]) -> Option<(Vec<Coons>, Vec<f64>, bool)> {
+    fn unfolded(&self, curves: &Curves, corners: &[usize]) -> Option<Unfolded> {
         let (plain, lengths) = blend::coons(curves, corners).ok()?;
         let based = if self.options.recognises { blend::based(&plain) } else { None };
         let mut all: Vec<Coons> = based.into_iter().chain([plain]).collect();
@@ -203,7 +248,13 @@ impl<'a> Task<'a> {
         let ring = self.rings.first()?;
         all.retain(|coons| !blend::is_coons_folded(coons, ring));
         let is_folded = all.len() < count;
-        Some((all, lengths, is_folded))
+        let longest = |coons: &Coons| self.allowed(&blend::laid(coons.clone(), &lengths, ring));
+        let all = all.into_iter().map(|coons| {
+            let longest = longest(&coons);
+            (coons, longest)
+        });
+        let all = all.collect();
+        Some(Unfolded { all, lengths, is_folded })
     }
 
     /// The same outline on a Coons surface that has been bent; `None` if that cannot be laid flat.
@@ -213,8 +264,8 @@ impl<'a> Task<'a> {
             let length = self.strands.get(one.curve).and_then(Option::as_ref).map_or(0.0, |strand| strand.length);
             lengths.iter_mut().skip(*side).take(1).for_each(|sum| *sum += length);
         }
-        let Meshed { points, triangles, longest, .. } = self.mesh(blend::laid(coons.clone(), &lengths, self.rings.first()?))?;
-        Some(Patch { surface: Surface::Coons(Box::new(coons)), report, points, triangles, longest })
+        let meshed = self.mesh(blend::laid(coons.clone(), &lengths, self.rings.first()?))?;
+        Some(self.patch(Surface::Coons(Box::new(coons)), report, meshed))
     }
 
     fn heights(&self, report: &mut Report) -> Option<(Surface, Meshed)> {
@@ -224,7 +275,7 @@ impl<'a> Task<'a> {
         }
         let (layout, frame) = blend::heights(self.rings)?;
         let most = (COSTLIEST / count) as usize;
-        let meshed = self.mesh_within(layout, most.min(self.options.inner))?;
+        let meshed = self.mesh_within(layout, f64::INFINITY, most.min(self.options.inner))?;
         report.method = Method::Heights;
         Some((Surface::Heights(frame), meshed))
     }
@@ -245,7 +296,7 @@ impl<'a> Task<'a> {
         star::is_star(&ring, centre)
     }
 
-    /// A surface for each curve to a centre.
+    /// A surface for each curve to a centre; spokes between them are divided until triangles are even or for so many rounds.
     fn fans(&self, report: &mut Report) -> Option<(Surface, Meshed)> {
         let ring = self.rings.first()?;
         let parts: Vec<(&Strand<'_>, Use)> = self.uses().collect();
@@ -254,32 +305,74 @@ impl<'a> Task<'a> {
             return None;
         }
         let curves = parts.iter().map(|(strand, one)| fans::curve(strand, one, self.options)).collect::<Option<_>>()?;
-        let mut whole = fans::Spokes::new(ring, centre, self.options.inner);
-        for part in fans::parts(ring, centre) {
-            let (layout, rims) = whole.laid(&part);
-            let alone = Task { rings: &[rims], ..*self };
-            let Meshed { points, triangles, .. } = alone.mesh(layout)?;
-            whole.take(&part, (points, triangles));
+        let mut shares = fans::even(ring, centre, self.options.inner);
+        let mut meshed = self.fans_of(ring, centre, &mut shares)?;
+        for _ in 0..CUTS {
+            if meshed.poor[1] == 0 || !meshed.is_cut {
+                break;
+            }
+            meshed = self.fans_of(ring, centre, &mut shares)?;
         }
         report.method = Method::Fans;
-        let meshed = Meshed { points: whole.points, triangles: whole.triangles, longest: f64::INFINITY, turns_back: false };
         Some((Surface::Fans { curves, centre }, meshed))
     }
 
-    fn mesh(&self, layout: Layout) -> Option<Meshed> {
-        // Long outlines need points in proportion.
-        let rim: usize = self.rings.iter().map(Vec::len).sum();
-        self.mesh_within(layout, self.options.inner.max(4 * rim))
+    /// Triangles of all parts around a centre. Spokes are divided by shares of them, and these as parts wish it for the next time.
+    fn fans_of(&self, ring: &[Rim], centre: Point, shares: &mut [Vec<f64>]) -> Option<Meshed> {
+        let mut meshed = Meshed { longest: f64::INFINITY, ..Meshed::default() };
+        let own = shares.to_vec();
+        let mut whole = fans::Spokes::new(ring, centre, &own);
+        for part in fans::parts(ring, centre) {
+            let (layout, rims) = whole.laid(&part);
+            let alone = Task { rings: &[rims], ..*self };
+            let made = alone.mesh(layout)?;
+            meshed.poor = [0, 1].map(|kind| meshed.poor[kind] + made.poor[kind]);
+            meshed.is_cut |= whole.divide(&part, &made.wishes, shares);
+            meshed.wishes.extend(made.wishes);
+            whole.take(&part, (made.points, made.triangles));
+        }
+        (meshed.points, meshed.triangles) = (whole.points, whole.triangles);
+        fans::merge(shares);
+        Some(meshed)
     }
 
-    fn mesh_within(&self, layout: Layout, most: usize) -> Option<Meshed> {
+    fn mesh(&self, layout: Layout) -> Option<Meshed> {
+        let longest = self.allowed(&layout);
+        self.mesh_within(layout, longest, self.most())
+    }
+
+    /// The longest edge that a surface allows.
+    fn allowed(&self, layout: &Layout) -> f64 {
+        layout.chart.longest(self.chord, self.options.angle)
+    }
+
+    /// Points within, at most: long outlines need them in proportion.
+    fn most(&self) -> usize {
+        self.options.inner.max(4 * self.rings.iter().map(Vec::len).sum::<usize>())
+    }
+
+    /// Meshes a layout, whose cuts are divided until triangles are even or for so many rounds.
+    fn mesh_within(&self, mut layout: Layout, longest: f64, most: usize) -> Option<Meshed> {
+        let longest = self.longest.min(longest);
+        let mut meshed = self.mesh_of(&layout, longest, most)?;
+        for _ in 0..CUTS {
+            if meshed.poor[1] == 0 || !layout.divide(&meshed.wishes) {
+                break;
+            }
+            meshed = self.mesh_of(&layout, longest, most)?;
+        }
+        Some(meshed)
+    }
+
+    /// Triangles of a layout.
+    fn mesh_of(&self, layout: &Layout, longest: f64, most: usize) -> Option<Meshed> {
         let Layout { chart, rings, added, is_mirrored } = layout;
+        let is_mirrored = *is_mirrored;
         let mirrored = |[x, y]: [f64; 2]| [if is_mirrored { -x } else { x }, y];
         let places: Vec<Vec<[f64; 2]>> =
             rings.iter().map(|ring| ring.iter().map(|(_, place)| mirrored(*place)).collect()).collect();
-        let longest = self.longest.min(chart.longest(self.chord, self.options.angle));
         if self.is_dry {
-            return Some(Meshed { points: Vec::new(), triangles: Vec::new(), longest, turns_back: false });
+            return Some(Meshed { longest, ..Meshed::default() });
         }
         let flat = triangles::triangles(&places)?;
         let corners: Vec<Corner> = rings.iter().flatten().map(|(corner, _)| *corner).collect();
@@ -296,12 +389,15 @@ impl<'a> Task<'a> {
         let rim = corners.iter().map(point).collect();
         let mut lifted = Lifted::new(flat);
         refine::refine(&mut lifted, longest, corners.len() + most);
-        lifted.raise(rim, &chart, is_mirrored);
-        refine::refine(&mut lifted, longest, corners.len() + most);
+        lifted.raise(rim, chart, is_mirrored);
+        let blocking = refine::refine(&mut lifted, longest, corners.len() + most);
         let turns_back = lifted.is_folded();
         let mut improved = Improved::new(lifted);
         improved.run(most);
-        chords::divide(&mut improved.lifted, &corners);
+        chords::divide(&mut improved.lifted, &corners, self.chords);
+        let angles = Angles::new(rings, &improved.lifted);
+        let poor = angles.count(&improved.lifted);
+        let wishes = if poor[1] > 0 { angles.wishes(&blocking, &improved.lifted) } else { Vec::new() };
         let first = added.len() as u32;
         let corner = |number: u32| {
             let within = || Corner::Inner(first + number - corners.len() as u32);
@@ -309,7 +405,7 @@ impl<'a> Task<'a> {
         };
         let triangles = improved.lifted.flat.triangles.iter().map(|triangle| triangle.map(corner)).collect();
         let points = added.iter().chain(improved.lifted.points.get(corners.len()..).unwrap_or_default()).copied().collect();
-        Some(Meshed { points, triangles, longest, turns_back })
+        Some(Meshed { points, triangles, longest, poor, wishes, is_cut: false, turns_back })
     }
 
     /// Curves fitted, in the direction of the outer loop, and the largest error.

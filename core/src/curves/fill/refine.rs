@@ -23,35 +23,36 @@ const HEIGHTS: [f64; 2] = [0.45, 0.7];
 const APART: f64 = 0.6;
 /// How much shorter edges may be at a distance from longer ones of rings, in parts of that.
 const DECAY: f64 = 0.35;
+/// Of two edges of rings that are in the way, one shorter than this part of the other is left.
+const SHORTER: f64 = 0.4;
+/// Passes over all triangles, at most.
+const PASSES: u32 = 4;
 /// The least distance of others, for a triangle that is too large, in parts of the largest radius.
 const WIDE: f64 = 0.8;
 
 /// Refines until no triangle is below 0.46, and none has a wider circle than one with edges of the length `longest`, or of those of rings
 /// nearby that are longer, where rings allow it; places are no more than `most` with those of rings. Triangles are divided in the order in
 /// which they arise, so places go in layer by layer from rings, and each changes few triangles. O(n log n).
-pub(super) fn refine(lifted: &mut Lifted<'_>, longest: f64, most: usize) {
+///
+/// Gives the edges of rings, by their places, that are in the way of triangles below 0.46: a finer division of them would help.
+pub(super) fn refine(lifted: &mut Lifted<'_>, longest: f64, most: usize) -> Vec<[u32; 2]> {
     lifted.legalise_all();
     let sizes = sizes(lifted, longest);
-    let mut state = State { lifted, sizes, longest, changed: Vec::new() };
+    let mut state = State { lifted, sizes, longest, changed: Vec::new(), blocking: Vec::new() };
     state.changed.extend(0..state.lifted.flat.triangles.len() as u32);
-    let mut queue: VecDeque<(u32, [u32; 3])> = VecDeque::new();
-    loop {
-        state.changed.sort_unstable();
-        state.changed.dedup();
-        for triangle in std::mem::take(&mut state.changed) {
-            if Shape::of(state.lifted, triangle).is_bad(state.radius(triangle)) {
-                queue.push_back((triangle, state.lifted.corners(triangle)));
-            }
+    for _ in 0..PASSES {
+        // A triangle that could not be divided may be later, when others around it are.
+        let before = state.lifted.points.len();
+        state.blocking.clear();
+        state.pass(most);
+        if state.blocking.is_empty() || state.lifted.points.len() == before {
+            break;
         }
-        let Some((triangle, corners)) = queue.pop_front() else { return };
-        if state.lifted.points.len() >= most {
-            return;
-        }
-        // It may have changed since.
-        if state.lifted.corners(triangle) == corners {
-            state.divide(triangle);
-        }
+        state.changed.extend(0..state.lifted.flat.triangles.len() as u32);
     }
+    state.blocking.sort_unstable();
+    state.blocking.dedup();
+    state.blocking
 }
 
 /// The length of edges wanted at each place: `longest`, or that of edges of rings there, if these are longer, getting shorter
@@ -93,6 +94,9 @@ fn sizes(lifted: &Lifted<'_>, longest: f64) -> Vec<f64> {
     }
     sizes
 }
+
+/// Edges of rings that are in the way of a place.
+type Blocking = [Option<u32>; 2];
 
 /// Measures of a triangle in space.
 #[derive(Clone, Copy, Debug)]
@@ -148,6 +152,8 @@ struct State<'s, 'a> {
     sizes: Vec<f64>,
     longest: f64,
     changed: Vec<u32>,
+    /// Edges of rings that are in the way of flat triangles, by their places.
+    blocking: Vec<[u32; 2]>,
 }
 
 impl State<'_, '_> {
@@ -160,6 +166,28 @@ impl State<'_, '_> {
         self.lifted.corners(triangle).into_iter().fold(self.longest, |most, corner| most.max(self.size(corner))) / 3.0_f64.sqrt()
     }
 
+    /// Divides triangles until none is left that can be.
+    fn pass(&mut self, most: usize) {
+        let mut queue: VecDeque<(u32, [u32; 3])> = VecDeque::new();
+        loop {
+            self.changed.sort_unstable();
+            self.changed.dedup();
+            for triangle in std::mem::take(&mut self.changed) {
+                if Shape::of(self.lifted, triangle).is_bad(self.radius(triangle)) {
+                    queue.push_back((triangle, self.lifted.corners(triangle)));
+                }
+            }
+            let Some((triangle, corners)) = queue.pop_front() else { return };
+            if self.lifted.points.len() >= most {
+                return;
+            }
+            // It may have changed since.
+            if self.lifted.corners(triangle) == corners {
+                self.divide(triangle);
+            }
+        }
+    }
+
     /// Divides a triangle, if a place for that is found.
     fn divide(&mut self, triangle: u32) {
         let shape = Shape::of(self.lifted, triangle);
@@ -169,22 +197,49 @@ impl State<'_, '_> {
         let height = if is_flat { centre.min(OFF * shape.shortest) } else { centre };
         // The shortest edge may be longer than what is wanted of all.
         let clear = if is_flat { shape.shortest.min(radius) } else { WIDE * radius };
-        if let Some(place) = above(self.lifted, shape.edge, height)
-            && let Some((inside, place, point)) = settled(self.lifted, triangle, place, clear)
-        {
-            let corners = self.lifted.corners(inside);
-            let least = |corner: u32| self.size(corner) - DECAY * distance(self.lifted.point(corner), point);
-            let size = corners.into_iter().fold(self.longest, |most, corner| most.max(least(corner)));
-            if self.lifted.insert(inside, place, point, &mut self.changed) {
-                self.sizes.push(size);
+        let Some(place) = above(self.lifted, shape.edge, height) else { return };
+        match settled(self.lifted, triangle, place, clear) {
+            Ok((inside, place, point)) => {
+                let corners = self.lifted.corners(inside);
+                let least = |corner: u32| self.size(corner) - DECAY * distance(self.lifted.point(corner), point);
+                let size = corners.into_iter().fold(self.longest, |most, corner| most.max(least(corner)));
+                if self.lifted.insert(inside, place, point, &mut self.changed) {
+                    self.sizes.push(size);
+                } else if is_flat {
+                    self.block([None; 2], triangle);
+                }
             }
+            Err(edges) if is_flat => self.block(edges, triangle),
+            Err(_) => {}
         }
+    }
+
+    /// Notes the edges of rings that are in the way of a triangle but for one that is much shorter than the other, or if none is known, the
+    /// longest one of the triangle or beside it.
+    fn block(&mut self, edges: Blocking, triangle: u32) {
+        let lifted = &*self.lifted;
+        let mut all: Vec<u32> = edges.into_iter().flatten().collect();
+        if all.is_empty() {
+            let own = |triangle: u32| 3 * triangle..3 * triangle + 3;
+            let beside = own(triangle).map(|edge| lifted.beyond(edge)).filter(|other| *other != NONE);
+            let near = own(triangle).chain(beside.flat_map(|other| own(other / 3))).filter(|edge| lifted.beyond(*edge) == NONE);
+            all.extend(near.max_by(|a, b| length(lifted, *a).total_cmp(&length(lifted, *b))));
+        }
+        let most = all.iter().map(|edge| length(lifted, *edge)).fold(0.0, f64::max);
+        all.retain(|edge| length(lifted, *edge) >= SHORTER * most);
+        self.blocking.extend(all.into_iter().map(|edge| lifted.around(edge)).map(|[_, a, b]| [a, b]));
     }
 }
 
-/// Where a place goes: the triangle, the place, and its point. `None` if others are nearer there than `clear`.
-fn settled(lifted: &Lifted<'_>, from: u32, mut place: [f64; 2], mut clear: f64) -> Option<(u32, [f64; 2], Point)> {
-    let mut end = lifted.walk(from, place)?;
+fn length(lifted: &Lifted<'_>, edge: u32) -> f64 {
+    let [_, a, b] = lifted.around(edge).map(|corner| lifted.point(corner));
+    distance(a, b)
+}
+
+/// Where a place goes: the triangle, the place, and its point; if others are nearer there than `clear`, the edges of rings that are in
+/// the way.
+fn settled(lifted: &Lifted<'_>, from: u32, mut place: [f64; 2], mut clear: f64) -> Result<(u32, [f64; 2], Point), Blocking> {
+    let mut end = lifted.walk(from, place).ok_or([None; 2])?;
     let mut point = lifted.lift(place);
     let low = |triangle: u32, point: Point, least: f64| {
         (3 * triangle..3 * triangle + 3).find(|edge| {
@@ -197,20 +252,25 @@ fn settled(lifted: &Lifted<'_>, from: u32, mut place: [f64; 2], mut clear: f64) 
         End::In(triangle) => low(triangle, point, HEIGHTS[0]),
     };
     if let Some(edge) = edge {
-        let [_, a, b] = lifted.around(edge).map(|corner| lifted.point(corner));
-        let length = distance(a, b);
-        place = above(lifted, edge, HEIGHTS[1] * length)?;
-        clear = APART * length;
+        let along = length(lifted, edge);
+        place = above(lifted, edge, HEIGHTS[1] * along).ok_or([Some(edge), None])?;
+        clear = APART * along;
         point = lifted.lift(place);
-        end = lifted.walk(edge / 3, place)?;
+        end = lifted.walk(edge / 3, place).ok_or([Some(edge), None])?;
     }
-    let End::In(triangle) = end else { return None };
+    let triangle = match end {
+        End::In(triangle) => triangle,
+        End::At(other) => return Err([edge, Some(other)]),
+    };
     let is_clear = |corner: u32| distance(lifted.point(corner), point) >= clear;
     let across = |edge: u32| Some(lifted.beyond(edge)).filter(|other| *other != NONE).map(|other| lifted.around(other)[0]);
-    let is_free = lifted.corners(triangle).into_iter().all(is_clear)
-        && (3 * triangle..3 * triangle + 3).filter_map(across).all(is_clear)
-        && low(triangle, point, 0.9 * HEIGHTS[0]).is_none();
-    is_free.then_some((triangle, place, point))
+    let is_free =
+        lifted.corners(triangle).into_iter().all(is_clear) && (3 * triangle..3 * triangle + 3).filter_map(across).all(is_clear);
+    match low(triangle, point, 0.9 * HEIGHTS[0]) {
+        Some(other) => Err([edge, Some(other)]),
+        None if is_free => Ok((triangle, place, point)),
+        None => Err([edge, None]),
+    }
 }
 
 #[cfg(test)]

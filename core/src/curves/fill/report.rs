@@ -110,6 +110,11 @@ pub struct Report {
     pub is_ambiguous: bool,
     /// Whether triangles run against the direction of the outline, so that they agree with those of other outlines.
     pub is_flipped: bool,
+    /// Triangles below 0.4 (twice the ratio of the radii of their inner and outer circles) at corners below 15° of the outline, or of one
+    /// of the surfaces to a centre that its curves have.
+    pub sharp: usize,
+    /// Triangles below 0.4 elsewhere: where the outline is narrower than about 1/1000 of its curves, or a surface folds.
+    pub poor: usize,
     /// Why there is no surface.
     pub problem: Option<Problem>,
 }

@@ -50,8 +50,10 @@ pub(super) struct Task<'a> {
 pub(super) struct Tried {
     plane: OnceLock<Option<Carrier>>,
     carriers: OnceLock<Vec<Carrier>>,
-    /// Coons surfaces that do not fold, the lengths of their sides, and whether one of those that were made folds.
-    coons: OnceLock<(Vec<Coons>, Vec<f64>, bool)>,
+    /// Those that circles and straight lines of the outline fix.
+    implied: OnceLock<Vec<Carrier>>,
+    /// Coons surfaces that do not fold, with the lengths of their sides, and whether one of those that were made folds.
+    coons: OnceLock<(Vec<(Coons, Vec<f64>)>, bool)>,
 }
 
 /// The surface of an outline and its triangles.
@@ -87,7 +89,6 @@ impl<'a> Task<'a> {
         let probes: Vec<Point> = self.uses().flat_map(|(strand, _)| strand.probes.iter().copied()).collect();
         let size = space::size(&probes);
         let cosines = self.cosines();
-        let corners = sides::corners(&cosines, self.options.smooth);
         let mut report = Report {
             method: Method::Fallback,
             sides: cosines.iter().filter(|cosine| **cosine <= self.options.smooth).count(),
@@ -111,7 +112,8 @@ impl<'a> Task<'a> {
             return self.fallback(report);
         }
         let tolerance = self.options.carrier.unwrap_or(1e-5 * size).max(report.gap.min(GAP * size));
-        let patch = self.carrier(&probes, tolerance, &mut report).or_else(|| self.blended(cosines, &corners, &mut report));
+        let patch = self.carrier(&probes, tolerance, &mut report);
+        let patch = patch.or_else(|| self.blended(cosines, (&probes, tolerance), &mut report));
         match patch {
             Some((surface, Meshed { points, triangles, longest, .. })) => Patch { surface, report, points, triangles, longest },
             None => self.fallback(report),
@@ -124,15 +126,8 @@ impl<'a> Task<'a> {
     }
 
     fn carrier(&self, probes: &[Point], tolerance: f64, report: &mut Report) -> Option<(Surface, Meshed)> {
-        let mut try_one = |carrier: Carrier, method: Method| {
-            let layout = layout::on_carrier(&carrier, self.rings, tolerance)?;
-            let meshed = self.mesh(layout)?;
-            report.method = method;
-            report.error = probes.iter().fold(0.0_f64, |most, point| most.max(carrier.distance(*point)));
-            Some((Surface::Carrier(carrier), meshed))
-        };
         let plane = self.tried.plane.get_or_init(|| carrier::plane(probes, tolerance));
-        if let Some(found) = plane.and_then(|plane| try_one(plane, Method::Plane)) {
+        if let Some(found) = plane.and_then(|plane| self.carried(plane, Method::Plane, (probes, tolerance), report)) {
             return Some(found);
         }
         if !self.options.recognises {
@@ -142,16 +137,50 @@ impl<'a> Task<'a> {
             let kinds: Vec<Kind> = self.uses().map(|(strand, _)| strand.kind).collect();
             carrier::recognise(&kinds, probes, tolerance)
         });
-        carriers.iter().find_map(|carrier| try_one(*carrier, Method::Recognised))
+        carriers.iter().find_map(|carrier| self.carried(*carrier, Method::Recognised, (probes, tolerance), report))
     }
 
-    /// Coons surfaces, heights, and a centre.
-    fn blended(&self, cosines: Vec<f64>, corners: &[usize], report: &mut Report) -> Option<(Surface, Meshed)> {
+    /// A surface that circles and straight lines fix, where the other curves are near it alone.
+    fn implied(&self, probes: &[Point], tolerance: f64, report: &mut Report) -> Option<(Surface, Meshed)> {
+        if !self.options.recognises {
+            return None;
+        }
+        let carriers = self.tried.implied.get_or_init(|| {
+            let exact = || self.uses().filter(|(strand, _)| strand.kind != Kind::Other);
+            let kinds: Vec<Kind> = exact().map(|(strand, _)| strand.kind).collect();
+            let points: Vec<Point> = exact().flat_map(|(strand, _)| strand.probes.iter().copied()).collect();
+            carrier::implied(&kinds, &points, probes, tolerance)
+        });
+        carriers.iter().find_map(|carrier| {
+            let tolerance = tolerance.max(carrier::farthest(carrier, probes));
+            self.carried(*carrier, Method::Recognised, (probes, tolerance), report)
+        })
+    }
+
+    /// The outline on a carrier, if it can be laid flat there.
+    fn carried(
+        &self,
+        carrier: Carrier,
+        method: Method,
+        (probes, tolerance): (&[Point], f64),
+        report: &mut Report,
+    ) -> Option<(Surface, Meshed)> {
+        let layout = layout::on_carrier(&carrier, self.rings, tolerance)?;
+        let meshed = self.mesh(layout)?;
+        report.method = method;
+        report.error = carrier::farthest(&carrier, probes);
+        Some((Surface::Carrier(carrier), meshed))
+    }
+
+    /// Coons surfaces, carriers that are near, heights, and a centre.
+    fn blended(&self, cosines: Vec<f64>, (probes, tolerance): (&[Point], f64), report: &mut Report) -> Option<(Surface, Meshed)> {
         if self.rings.len() > 1 {
-            let found = if self.is_dry { None } else { self.heights(report) };
+            let found = self.implied(probes, tolerance, report);
+            let found = if self.is_dry { found } else { found.or_else(|| self.heights(report)) };
             report.problem = found.is_none().then_some(Problem::Holes);
             return found;
         }
+        let choices = sides::choices(&cosines, self.options.smooth);
         let curves = match self.curves(cosines) {
             Ok((curves, error)) => {
                 report.error = error;
@@ -163,7 +192,11 @@ impl<'a> Task<'a> {
                 return found;
             }
         };
-        let coons = self.coons(&curves, corners, report);
+        // Four sides meet all curves; with less of them, a surface is a guess.
+        let four = choices.iter().any(|corners| corners.len() == 4);
+        let coons = if four { self.coons(&curves, &choices, report) } else { None };
+        let coons = coons.or_else(|| self.implied(probes, tolerance, report));
+        let coons = coons.or_else(|| if four { None } else { self.coons(&curves, &choices, report) });
         if self.is_dry {
             return coons;
         }
@@ -173,10 +206,10 @@ impl<'a> Task<'a> {
         found
     }
 
-    fn coons(&self, curves: &Curves, corners: &[usize], report: &mut Report) -> Option<(Surface, Meshed)> {
-        let (all, lengths, is_folded) = self.tried.coons.get_or_init(|| self.unfolded(curves, corners).unwrap_or_default());
+    fn coons(&self, curves: &Curves, choices: &[Vec<usize>], report: &mut Report) -> Option<(Surface, Meshed)> {
+        let (all, is_folded) = self.tried.coons.get_or_init(|| self.unfolded(curves, choices));
         report.is_folded = *is_folded;
-        for coons in all {
+        for (coons, lengths) in all {
             let layout = blend::laid(coons.clone(), lengths, self.rings.first()?);
             let Some(meshed) = self.mesh(layout) else { continue };
             // Triangles that turn back are evidence enough for a closer look.
@@ -194,16 +227,18 @@ impl<'a> Task<'a> {
         None
     }
 
-    /// Coons surfaces that do not fold, the one upon a surface of revolution first.
-    fn unfolded(&self, curves: &Curves, corners: &[usize]) -> Option<(Vec<Coons>, Vec<f64>, bool)> {
-        let (plain, lengths) = blend::coons(curves, corners).ok()?;
-        let based = if self.options.recognises { blend::based(&plain) } else { None };
-        let mut all: Vec<Coons> = based.into_iter().chain([plain]).collect();
+    /// Coons surfaces that do not fold, by the choices of corners, of each the one upon a surface of revolution first; and whether one folds.
+    fn unfolded(&self, curves: &Curves, choices: &[Vec<usize>]) -> (Vec<(Coons, Vec<f64>)>, bool) {
+        let mut all: Vec<(Coons, Vec<f64>)> = Vec::new();
+        for (plain, lengths) in choices.iter().filter_map(|corners| blend::coons(curves, corners).ok()) {
+            let based = if self.options.recognises { blend::based(&plain) } else { None };
+            all.extend(based.into_iter().chain([plain]).map(|coons| (coons, lengths.clone())));
+        }
         let count = all.len();
-        let ring = self.rings.first()?;
-        all.retain(|coons| !blend::is_coons_folded(coons, ring));
+        let ring = self.rings.first().map_or(&[][..], Vec::as_slice);
+        all.retain(|(coons, _)| !blend::is_coons_folded(coons, ring));
         let is_folded = all.len() < count;
-        Some((all, lengths, is_folded))
+        (all, is_folded)
     }
 
     /// The same outline on a Coons surface that has been bent; `None` if that cannot be laid flat.

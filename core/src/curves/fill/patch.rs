@@ -45,6 +45,9 @@ pub(super) struct Task<'a> {
     pub(super) tried: &'a Tried,
 }
 
+/// A Coons surface, and the lengths of its sides.
+type Sided = (Coons, Vec<f64>);
+
 /// Surfaces of an outline that do not depend on how its curves are divided, made when they are first asked for.
 #[derive(Debug, Default)]
 pub(super) struct Tried {
@@ -52,8 +55,8 @@ pub(super) struct Tried {
     carriers: OnceLock<Vec<Carrier>>,
     /// Those that circles and straight lines of the outline fix.
     implied: OnceLock<Vec<Carrier>>,
-    /// Coons surfaces that do not fold, with the lengths of their sides, and whether one of those that were made folds.
-    coons: OnceLock<(Vec<(Coons, Vec<f64>)>, bool)>,
+    /// Coons surfaces that do not fold, and whether one of those that were made folds.
+    coons: OnceLock<(Vec<Sided>, bool)>,
 }
 
 /// The surface of an outline and its triangles.
@@ -140,9 +143,10 @@ impl<'a> Task<'a> {
         carriers.iter().find_map(|carrier| self.carried(*carrier, Method::Recognised, (probes, tolerance), report))
     }
 
-    /// A surface that circles and straight lines fix, where the other curves are near it alone.
+    /// A surface that circles and straight lines fix, where the other curves are near it alone; none where it was said how near they
+    /// have to be.
     fn implied(&self, probes: &[Point], tolerance: f64, report: &mut Report) -> Option<(Surface, Meshed)> {
-        if !self.options.recognises {
+        if !self.options.recognises || self.options.carrier.is_some() {
             return None;
         }
         let carriers = self.tried.implied.get_or_init(|| {
@@ -228,8 +232,8 @@ impl<'a> Task<'a> {
     }
 
     /// Coons surfaces that do not fold, by the choices of corners, of each the one upon a surface of revolution first; and whether one folds.
-    fn unfolded(&self, curves: &Curves, choices: &[Vec<usize>]) -> (Vec<(Coons, Vec<f64>)>, bool) {
-        let mut all: Vec<(Coons, Vec<f64>)> = Vec::new();
+    fn unfolded(&self, curves: &Curves, choices: &[Vec<usize>]) -> (Vec<Sided>, bool) {
+        let mut all: Vec<Sided> = Vec::new();
         for (plain, lengths) in choices.iter().filter_map(|corners| blend::coons(curves, corners).ok()) {
             let based = if self.options.recognises { blend::based(&plain) } else { None };
             all.extend(based.into_iter().chain([plain]).map(|coons| (coons, lengths.clone())));

@@ -26,12 +26,9 @@ pub(super) fn corners(cosines: &[f64], smooth: f64) -> Vec<usize> {
     corners
 }
 
-/// Joints whose tangents differ by less than this cosine are no corners, even where a loop has too few.
-const SMOOTHEST: f64 = 0.98;
-
 /// Sets of corners in the order in which they are tried. Four curves that meet in two corners at least are four sides, even where two of
-/// them go on smoothly: an outline of four curves is most often that of a patch of four sides. Then the corners of [`corners`]; a loop
-/// with one of these at most gets its two sharpest joints, if neither is smooth. O(n).
+/// them go on smoothly: an outline of four curves is most often that of a patch of four sides. Then the corners of [`corners`], if there
+/// are two. O(n).
 pub(super) fn choices(cosines: &[f64], smooth: f64) -> Vec<Vec<usize>> {
     let sharp = corners(cosines, smooth);
     let mut choices = Vec::with_capacity(2);
@@ -40,20 +37,8 @@ pub(super) fn choices(cosines: &[f64], smooth: f64) -> Vec<Vec<usize>> {
     }
     if sharp.len() > 1 {
         choices.push(sharp);
-    } else if let Some(two) = sharpest(cosines) {
-        choices.push(two);
     }
     choices
-}
-
-/// The two sharpest joints, in order, if neither is smooth.
-fn sharpest(cosines: &[f64]) -> Option<Vec<usize>> {
-    let key = |at: &usize| cosines.get(*at).copied().unwrap_or(1.0);
-    let mut all: Vec<usize> = (0..cosines.len()).filter(|at| key(at) <= SMOOTHEST).collect();
-    all.sort_by(|a, b| key(a).total_cmp(&key(b)).then(a.cmp(b)));
-    all.truncate(2);
-    all.sort_unstable();
-    (all.len() == 2).then_some(all)
 }
 
 /// Sides between corners. Of three, the corner that becomes the degenerate side, the sharpest one, is between the second and the
@@ -110,14 +95,13 @@ mod tests {
         assert_eq!(corners(&[0.95, 0.99], 0.9), [] as [usize; 0]);
     }
 
-    /// Four curves are four sides before their two corners are looked at; a joint that is hardly bent is no corner.
+    /// Four curves are four sides before their two corners are looked at; one corner makes no sides.
     #[test]
     fn four_curves_are_four_sides_first() {
         assert_eq!(choices(&[0.1, 0.99, 0.2, 0.95], 0.9), [vec![0, 1, 2, 3], vec![0, 2]]);
         assert_eq!(choices(&[0.1, 0.2, 0.3, 0.4], 0.9), [vec![0, 1, 2, 3]]);
         assert_eq!(choices(&[0.1, 0.99, 0.2], 0.9), [vec![0, 2]]);
-        assert_eq!(choices(&[0.99, 0.95, 0.7], 0.9), [vec![1, 2]]);
-        assert_eq!(choices(&[0.99, 0.99, 0.7], 0.9), [] as [Vec<usize>; 0]);
+        assert_eq!(choices(&[0.99, 0.95, 0.7], 0.9), [] as [Vec<usize>; 0]);
     }
 
     #[test]

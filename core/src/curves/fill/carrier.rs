@@ -141,6 +141,29 @@ pub(super) fn recognise(kinds: &[Kind], probes: &[Point], tolerance: f64) -> Vec
     found
 }
 
+/// How far other curves of an outline may be from a surface that its circles and straight lines fix, in sizes: CAD programs write curves in
+/// which surfaces meet as splines that are near them, to some 10⁻⁴.
+const NEAR: f64 = 2e-4;
+
+/// Surfaces that circles and straight lines of an outline fix, and to which its other curves are near, the nearest first. `exact` are
+/// points of the first, `kinds` are theirs, and `probes` are points of all curves. O(points · axes).
+pub(super) fn implied(kinds: &[Kind], exact: &[Point], probes: &[Point], tolerance: f64) -> Vec<Carrier> {
+    let size = space::size(probes);
+    // Circles in one plane fix nothing.
+    if exact.len() == probes.len() || space::size(exact) < 0.1 * size || plane(exact, 0.01 * size).is_some() {
+        return Vec::new();
+    }
+    let near = recognise(kinds, exact, tolerance).into_iter().map(|carrier| (farthest(&carrier, probes), carrier));
+    let mut near: Vec<(f64, Carrier)> = near.filter(|(far, _)| *far <= NEAR * size).collect();
+    near.sort_by(|(a, _), (b, _)| a.total_cmp(b));
+    near.into_iter().map(|(_, carrier)| carrier).collect()
+}
+
+/// The largest distance of points.
+pub(super) fn farthest(carrier: &Carrier, probes: &[Point]) -> f64 {
+    probes.iter().fold(0.0_f64, |most, point| most.max(carrier.distance(*point)))
+}
+
 /// Axes of circles, each once, in the order of the curves.
 fn axes(kinds: &[Kind], probes: &[Point], tolerance: f64) -> Vec<Frame> {
     let mut axes: Vec<Frame> = Vec::new();

@@ -10,11 +10,12 @@ use super::mesh::Mesh;
 use super::network::{self, Divided, Strands};
 use super::options::{Continuity, Options, Outline};
 use super::orient;
-use super::patch::{Patch, Task, Tried};
+use super::patch::{Patch, Task};
 use super::poor::Split;
 use super::report::{Report, Surface};
 use super::strand::Strand;
 use super::tangent::{self, Beside};
+use super::tried::Tried;
 use crate::curves::curve::{Shape, Spline};
 use crate::curves::vector::Point;
 
@@ -63,8 +64,9 @@ pub enum FillError {
 /// Fills outlines. `shapes` are those of the curves, by the numbers that outlines use (of curves that close gaps, too).
 ///
 /// Each curve is divided once, by the finest wish of its outlines. An outline in a plane is trimmed from it; one on a cylinder,
-/// cone, sphere or torus, from that; others are Coons surfaces of two to four sides, upon a surface of revolution where one nearly
-/// has these, and with the tangent planes of their neighbours where [`Options::continuity`] asks for them; where they fold, heights of
+/// cone, sphere or torus, from that; others are Coons surfaces of two to four sides (of two or three if no such surface is fixed by the
+/// circles and straight lines of the outline, with the other curves no farther from it than 2 · 10⁻⁴ of the size), upon a surface of
+/// revolution where one nearly has these, and with the tangent planes of their neighbours where [`Options::continuity`] asks for them; where they fold, heights of
 /// a thin plate over a plane; where that crosses itself, a cone to a centre, or one for each curve, if no curves cross as seen from
 /// there. What folds then is left, [`Surface::Fallback`].
 ///

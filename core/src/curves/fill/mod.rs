@@ -39,6 +39,7 @@ mod refine;
 mod report;
 mod revolved;
 mod sense;
+mod sided;
 mod sides;
 mod space;
 mod spline;
@@ -49,6 +50,7 @@ mod tangent;
 #[cfg(test)]
 mod tests;
 mod triangles;
+mod tried;
 mod weights;
 
 pub use all::{FilledNetwork, fill_network};

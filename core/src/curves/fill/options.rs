@@ -16,7 +16,7 @@ pub struct Options {
     /// of which they are off by about 10⁻⁶ then.
     pub tolerance: Option<f64>,
     /// How far curves may be from a plane, cylinder, cone, sphere or torus that is taken for their surface; `None`: 10⁻⁵ of the
-    /// outline's size, or the gaps between its curves.
+    /// outline's size, or the gaps between its curves. Where circles and straight lines are on one, splines may be 2 · 10⁻⁴ of the size from it.
     pub carrier: Option<f64>,
     /// Whether such surfaces are looked for, planes apart, which always are.
     pub recognises: bool,

@@ -1,11 +1,8 @@
 //! The surface and the mesh of one outline: methods tried in their order of trust.
 
-use std::sync::OnceLock;
-
 use super::blend::{self, Curves};
 use super::carrier::{self, Carrier};
 use super::chords::{self, Chord};
-use super::coons::Coons;
 use super::fans;
 use super::fit::FitError;
 use super::improve::Improved;
@@ -20,6 +17,7 @@ use super::space;
 use super::star;
 use super::strand::{Kind, Strand};
 use super::triangles;
+use super::tried::Tried;
 use crate::curves::Use;
 use crate::curves::vector::{Point, distance, dot, scale};
 
@@ -30,8 +28,6 @@ const COSTLIEST: f64 = 1e8;
 
 /// Rounds in which cuts are divided, at most.
 const CUTS: u32 = 12;
-/// Parameters each way at which a surface is looked at again.
-const FINER: u32 = 64;
 
 /// An outline with all that it needs.
 #[derive(Clone, Copy, Debug)]
@@ -50,25 +46,6 @@ pub(super) struct Task<'a> {
     pub(super) chords: &'a [Chord],
 }
 
-/// Coons surfaces of an outline.
-#[derive(Debug, Default)]
-struct Unfolded {
-    /// Coons surfaces that do not fold, each with the longest edge that it allows.
-    all: Vec<(Coons, f64)>,
-    /// The lengths of their sides.
-    lengths: Vec<f64>,
-    /// Whether one of those that were made folds.
-    is_folded: bool,
-}
-
-/// Surfaces of an outline that do not depend on how its curves are divided, made when they are first asked for.
-#[derive(Debug, Default)]
-pub(super) struct Tried {
-    plane: OnceLock<Option<Carrier>>,
-    carriers: OnceLock<Vec<Carrier>>,
-    coons: OnceLock<Unfolded>,
-}
-
 /// The surface of an outline and its triangles.
 #[derive(Clone, Debug)]
 pub(super) struct Patch {
@@ -84,10 +61,10 @@ pub(super) struct Patch {
 
 /// Points within, triangles, and the longest edge that the surface allows.
 #[derive(Clone, Debug, Default)]
-struct Meshed {
+pub(super) struct Meshed {
     points: Vec<Point>,
     triangles: Vec<[Corner; 3]>,
-    longest: f64,
+    pub(super) longest: f64,
     /// Triangles below 0.4: at corners of the outline below 15°, and elsewhere.
     poor: [usize; 2],
     /// Where to divide edges of rings for the sake of those elsewhere.
@@ -95,7 +72,14 @@ struct Meshed {
     /// Whether there are wishes for spokes.
     is_cut: bool,
     /// Whether triangles beside each other face away from each other.
-    turns_back: bool,
+    pub(super) turns_back: bool,
+}
+
+impl Meshed {
+    /// Nothing but the longest edge.
+    pub(super) fn dry(longest: f64) -> Self {
+        Self { longest, ..Self::default() }
+    }
 }
 
 impl<'a> Task<'a> {
@@ -105,7 +89,7 @@ impl<'a> Task<'a> {
         all.filter_map(move |one| strands.get(one.curve).and_then(Option::as_ref).map(|strand| (strand, *one)))
     }
 
-    fn patch(&self, surface: Surface, mut report: Report, meshed: Meshed) -> Patch {
+    pub(super) fn patch(&self, surface: Surface, mut report: Report, meshed: Meshed) -> Patch {
         let Meshed { points, triangles, longest, poor, wishes, .. } = meshed;
         [report.sharp, report.poor] = poor;
         let splits = if wishes.is_empty() { Vec::new() } else { poor::splits(self.outline, self.rings, &wishes) };
@@ -117,7 +101,6 @@ impl<'a> Task<'a> {
         let probes: Vec<Point> = self.uses().flat_map(|(strand, _)| strand.probes.iter().copied()).collect();
         let size = space::size(&probes);
         let cosines = self.cosines();
-        let corners = sides::corners(&cosines, self.options.smooth);
         let mut report = Report {
             method: Method::Fallback,
             sides: cosines.iter().filter(|cosine| **cosine <= self.options.smooth).count(),
@@ -143,7 +126,8 @@ impl<'a> Task<'a> {
             return self.fallback(report);
         }
         let tolerance = self.options.carrier.unwrap_or(1e-5 * size).max(report.gap.min(GAP * size));
-        let found = self.carrier(&probes, tolerance, &mut report).or_else(|| self.blended(cosines, &corners, &mut report));
+        let found = self.carrier(&probes, tolerance, &mut report);
+        let found = found.or_else(|| self.blended(cosines, (&probes, tolerance), &mut report));
         match found {
             Some((surface, meshed)) => self.patch(surface, report, meshed),
             None => self.fallback(report),
@@ -163,15 +147,8 @@ impl<'a> Task<'a> {
     }
 
     fn carrier(&self, probes: &[Point], tolerance: f64, report: &mut Report) -> Option<(Surface, Meshed)> {
-        let mut try_one = |carrier: Carrier, method: Method| {
-            let layout = layout::on_carrier(&carrier, self.rings, tolerance)?;
-            let meshed = self.mesh(layout)?;
-            report.method = method;
-            report.error = probes.iter().fold(0.0_f64, |most, point| most.max(carrier.distance(*point)));
-            Some((Surface::Carrier(carrier), meshed))
-        };
         let plane = self.tried.plane.get_or_init(|| carrier::plane(probes, tolerance));
-        if let Some(found) = plane.and_then(|plane| try_one(plane, Method::Plane)) {
+        if let Some(found) = plane.and_then(|plane| self.carried(plane, Method::Plane, (probes, tolerance), report)) {
             return Some(found);
         }
         if !self.options.recognises {
@@ -181,16 +158,51 @@ impl<'a> Task<'a> {
             let kinds: Vec<Kind> = self.uses().map(|(strand, _)| strand.kind).collect();
             carrier::recognise(&kinds, probes, tolerance)
         });
-        carriers.iter().find_map(|carrier| try_one(*carrier, Method::Recognised))
+        carriers.iter().find_map(|carrier| self.carried(*carrier, Method::Recognised, (probes, tolerance), report))
     }
 
-    /// Coons surfaces, heights, and a centre.
-    fn blended(&self, cosines: Vec<f64>, corners: &[usize], report: &mut Report) -> Option<(Surface, Meshed)> {
+    /// A surface that circles and straight lines fix, where the other curves are near it alone; none where it was said how near they
+    /// have to be.
+    fn implied(&self, probes: &[Point], tolerance: f64, report: &mut Report) -> Option<(Surface, Meshed)> {
+        if !self.options.recognises || self.options.carrier.is_some() {
+            return None;
+        }
+        let carriers = self.tried.implied.get_or_init(|| {
+            let exact = || self.uses().filter(|(strand, _)| strand.kind != Kind::Other);
+            let kinds: Vec<Kind> = exact().map(|(strand, _)| strand.kind).collect();
+            let points: Vec<Point> = exact().flat_map(|(strand, _)| strand.probes.iter().copied()).collect();
+            carrier::implied(&kinds, &points, probes, tolerance)
+        });
+        carriers.iter().find_map(|carrier| {
+            let tolerance = tolerance.max(carrier::farthest(carrier, probes));
+            self.carried(*carrier, Method::Recognised, (probes, tolerance), report)
+        })
+    }
+
+    /// The outline on a carrier, if it can be laid flat there.
+    fn carried(
+        &self,
+        carrier: Carrier,
+        method: Method,
+        (probes, tolerance): (&[Point], f64),
+        report: &mut Report,
+    ) -> Option<(Surface, Meshed)> {
+        let layout = layout::on_carrier(&carrier, self.rings, tolerance)?;
+        let meshed = self.mesh(layout)?;
+        report.method = method;
+        report.error = carrier::farthest(&carrier, probes);
+        Some((Surface::Carrier(carrier), meshed))
+    }
+
+    /// Coons surfaces, carriers that are near, heights, and a centre.
+    fn blended(&self, cosines: Vec<f64>, (probes, tolerance): (&[Point], f64), report: &mut Report) -> Option<(Surface, Meshed)> {
         if self.rings.len() > 1 {
-            let found = if self.is_dry { None } else { self.heights(report) };
+            let found = self.implied(probes, tolerance, report);
+            let found = if self.is_dry { found } else { found.or_else(|| self.heights(report)) };
             report.problem = found.is_none().then_some(Problem::Holes);
             return found;
         }
+        let choices = sides::choices(&cosines, self.options.smooth);
         let curves = match self.curves(cosines) {
             Ok((curves, error)) => {
                 report.error = error;
@@ -202,7 +214,11 @@ impl<'a> Task<'a> {
                 return found;
             }
         };
-        let coons = self.coons(&curves, corners, report);
+        // Four sides meet all curves; with less of them, a surface is a guess.
+        let four = choices.iter().any(|corners| corners.len() == 4);
+        let coons = if four { self.coons(&curves, &choices, report) } else { None };
+        let coons = coons.or_else(|| self.implied(probes, tolerance, report));
+        let coons = coons.or_else(|| if four { None } else { self.coons(&curves, &choices, report) });
         if self.is_dry {
             return coons;
         }
@@ -210,62 +226,6 @@ impl<'a> Task<'a> {
         let found = found.or_else(|| self.centre(&curves, report)).or_else(|| self.fans(report));
         report.problem = found.is_none().then_some(Problem::Folds);
         found
-    }
-
-    fn coons(&self, curves: &Curves, corners: &[usize], report: &mut Report) -> Option<(Surface, Meshed)> {
-        let Unfolded { all, lengths, is_folded } =
-            self.tried.coons.get_or_init(|| self.unfolded(curves, corners).unwrap_or_default());
-        report.is_folded = *is_folded;
-        for (coons, longest) in all {
-            // A dry run needs no outline on the map.
-            let meshed = if self.is_dry {
-                Some(Meshed { longest: self.longest.min(*longest), ..Meshed::default() })
-            } else {
-                self.mesh_within(blend::laid(coons.clone(), lengths, self.rings.first()?), *longest, self.most())
-            };
-            let Some(meshed) = meshed else { continue };
-            // Triangles that turn back are evidence enough for a closer look.
-            if meshed.turns_back && coons.is_folded(FINER) {
-                report.is_folded = true;
-                continue;
-            }
-            report.method = match coons.sides {
-                2 => Method::Ruled,
-                3 => Method::Triangle,
-                _ => Method::Coons,
-            };
-            return Some((Surface::Coons(Box::new(coons.clone())), meshed));
-        }
-        None
-    }
-
-    /// Coons surfaces that do not fold, the one upon a surface of revolution first.
-    fn unfolded(&self, curves: &Curves, corners: &[usize]) -> Option<Unfolded> {
-        let (plain, lengths) = blend::coons(curves, corners).ok()?;
-        let based = if self.options.recognises { blend::based(&plain) } else { None };
-        let mut all: Vec<Coons> = based.into_iter().chain([plain]).collect();
-        let count = all.len();
-        let ring = self.rings.first()?;
-        all.retain(|coons| !blend::is_coons_folded(coons, ring));
-        let is_folded = all.len() < count;
-        let longest = |coons: &Coons| self.allowed(&blend::laid(coons.clone(), &lengths, ring));
-        let all = all.into_iter().map(|coons| {
-            let longest = longest(&coons);
-            (coons, longest)
-        });
-        let all = all.collect();
-        Some(Unfolded { all, lengths, is_folded })
-    }
-
-    /// The same outline on a Coons surface that has been bent; `None` if that cannot be laid flat.
-    pub(super) fn bent(&self, coons: Coons, report: Report) -> Option<Patch> {
-        let mut lengths = vec![0.0; coons.sides];
-        for (one, (side, ..)) in self.outline.outer.iter().zip(&coons.spans) {
-            let length = self.strands.get(one.curve).and_then(Option::as_ref).map_or(0.0, |strand| strand.length);
-            lengths.iter_mut().skip(*side).take(1).for_each(|sum| *sum += length);
-        }
-        let meshed = self.mesh(blend::laid(coons.clone(), &lengths, self.rings.first()?))?;
-        Some(self.patch(Surface::Coons(Box::new(coons)), report, meshed))
     }
 
     fn heights(&self, report: &mut Report) -> Option<(Surface, Meshed)> {
@@ -336,23 +296,23 @@ impl<'a> Task<'a> {
         Some(meshed)
     }
 
-    fn mesh(&self, layout: Layout) -> Option<Meshed> {
+    pub(super) fn mesh(&self, layout: Layout) -> Option<Meshed> {
         let longest = self.allowed(&layout);
         self.mesh_within(layout, longest, self.most())
     }
 
     /// The longest edge that a surface allows.
-    fn allowed(&self, layout: &Layout) -> f64 {
+    pub(super) fn allowed(&self, layout: &Layout) -> f64 {
         layout.chart.longest(self.chord, self.options.angle)
     }
 
     /// Points within, at most: long outlines need them in proportion.
-    fn most(&self) -> usize {
+    pub(super) fn most(&self) -> usize {
         self.options.inner.max(4 * self.rings.iter().map(Vec::len).sum::<usize>())
     }
 
     /// Meshes a layout, whose cuts are divided until triangles are even or for so many rounds.
-    fn mesh_within(&self, mut layout: Layout, longest: f64, most: usize) -> Option<Meshed> {
+    pub(super) fn mesh_within(&self, mut layout: Layout, longest: f64, most: usize) -> Option<Meshed> {
         let longest = self.longest.min(longest);
         let mut meshed = self.mesh_of(&layout, longest, most)?;
         for _ in 0..CUTS {

@@ -13,7 +13,7 @@ use crate::curves::vector::Point;
 pub enum Method {
     /// All curves are in one plane.
     Plane,
-    /// All curves are on one cylinder, cone, sphere or torus.
+    /// All curves are on one cylinder, cone, sphere or torus; or circles and straight lines of the outline fix one that the others are near.
     Recognised,
     /// Four sides, bilinearly blended; upon a surface of revolution, if one nearly has them.
     Coons,

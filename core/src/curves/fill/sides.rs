@@ -26,6 +26,21 @@ pub(super) fn corners(cosines: &[f64], smooth: f64) -> Vec<usize> {
     corners
 }
 
+/// Sets of corners in the order in which they are tried. Four curves that meet in two corners at least are four sides, even where two of
+/// them go on smoothly: an outline of four curves is most often that of a patch of four sides. Then the corners of [`corners`], if there
+/// are two. O(n).
+pub(super) fn choices(cosines: &[f64], smooth: f64) -> Vec<Vec<usize>> {
+    let sharp = corners(cosines, smooth);
+    let mut choices = Vec::with_capacity(2);
+    if cosines.len() == 4 && (2..4).contains(&sharp.len()) {
+        choices.push(vec![0, 1, 2, 3]);
+    }
+    if sharp.len() > 1 {
+        choices.push(sharp);
+    }
+    choices
+}
+
 /// Sides between corners. Of three, the corner that becomes the degenerate side, the sharpest one, is between the second and the
 /// third.
 pub(super) fn sides(corners: &[usize], cosines: &[f64]) -> Vec<Side> {
@@ -78,6 +93,15 @@ mod tests {
         let pairs: Vec<_> = sides_.iter().map(|side| (side.first, side.count)).collect();
         assert_eq!(pairs, [(1, 1), (2, 2), (4, 2), (6, 2)]);
         assert_eq!(corners(&[0.95, 0.99], 0.9), [] as [usize; 0]);
+    }
+
+    /// Four curves are four sides before their two corners are looked at; one corner makes no sides.
+    #[test]
+    fn four_curves_are_four_sides_first() {
+        assert_eq!(choices(&[0.1, 0.99, 0.2, 0.95], 0.9), [vec![0, 1, 2, 3], vec![0, 2]]);
+        assert_eq!(choices(&[0.1, 0.2, 0.3, 0.4], 0.9), [vec![0, 1, 2, 3]]);
+        assert_eq!(choices(&[0.1, 0.99, 0.2], 0.9), [vec![0, 2]]);
+        assert_eq!(choices(&[0.99, 0.95, 0.7], 0.9), [] as [Vec<usize>; 0]);
     }
 
     #[test]

@@ -260,3 +260,40 @@ fn neighbours_share_points_and_threads_change_nothing() {
     assert!(quality(&result.mesh).iter().all(|quality| *quality > 0.4));
     assert_eq!(result, run(3));
 }
+
+/// An eighth of a sphere with two sides that are arcs, and a cubic Bézier curve for the third, which is 2.7 · 10⁻⁴ off between its ends
+/// (4/3 (√2 − 1) for its handles): the arcs fix the sphere. If it is off by a hundredth, no sphere is meant.
+#[test]
+fn circles_fix_the_surface_of_curves_that_are_near() {
+    let [x, y, z] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+    let filled_with = |handle: f64| {
+        let knots = vec![0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0];
+        let near = Spline::new(3, knots, vec![z, [handle, 0.0, 1.0], [1.0, 0.0, handle], x], None, None).unwrap();
+        let shapes = [arc([0.0; 3], x, y, [0.0, FRAC_PI_2]), arc([0.0; 3], y, z, [0.0, FRAC_PI_2]), Shape::Spline(near)];
+        filled(&shapes, &[outline([1, 2, 3])], &Options::default())
+    };
+    let near = filled_with(4.0 / 3.0 * (2.0_f64.sqrt() - 1.0));
+    let Surface::Carrier(Carrier::Sphere { radius, frame }) = near.surfaces[0] else { panic!("{:?}", near.reports) };
+    assert!((radius - 1.0).abs() < 1e-9 && distance(frame.origin, [0.0; 3]) < 1e-9);
+    assert!((2e-4..2.8e-4).contains(&near.reports[0].error), "{}", near.reports[0].error);
+    assert!(off(&near, |point| distance(point, [0.0; 3]) - 1.0) < 2.8e-4);
+    assert_eq!(filled_with(0.58).reports[0].method, Method::Triangle);
+}
+
+/// Four curves are four sides, though the first goes on smoothly into the second, so that three corners are sharp.
+#[test]
+fn four_curves_are_four_sides() {
+    let bend = |a: Point, b: Point, c: Point, d: Point| {
+        let knots = vec![0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0];
+        Shape::Spline(Spline::new(3, knots, vec![a, b, c, d], None, None).unwrap())
+    };
+    let shapes = [
+        line([0.0, 0.0, 0.0], [3.0, 0.0, 0.0]),
+        bend([3.0, 0.0, 0.0], [3.5, 0.0, 0.0], [3.8, 0.5, 0.5], [3.9, 1.0, 1.0]),
+        bend([3.9, 1.0, 1.0], [3.0, 1.0, 1.0], [1.0, 1.0, 1.2], [0.0, 1.0, 1.0]),
+        line([0.0, 1.0, 1.0], [0.0, 0.0, 0.0]),
+    ];
+    let filled = filled(&shapes, &[outline([1, 2, 3, 4])], &Options::default());
+    let report = &filled.reports[0];
+    assert_eq!((report.method, report.sides, report.is_folded), (Method::Coons, 3, false));
+}

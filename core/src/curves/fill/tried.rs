@@ -1,0 +1,34 @@
+//! Surfaces of an outline that are made once, however often its curves are divided.
+
+use std::sync::OnceLock;
+
+use super::carrier::Carrier;
+use super::coons::Coons;
+
+/// A Coons surface.
+#[derive(Debug)]
+pub(super) struct Sided {
+    pub(super) coons: Coons,
+    /// The lengths of its sides.
+    pub(super) lengths: Vec<f64>,
+    /// The longest edge that it allows.
+    pub(super) longest: f64,
+}
+
+/// Coons surfaces of an outline that do not fold.
+#[derive(Debug, Default)]
+pub(super) struct Unfolded {
+    pub(super) all: Vec<Sided>,
+    /// Whether one of those that were made folds.
+    pub(super) is_folded: bool,
+}
+
+/// Surfaces of an outline that do not depend on how its curves are divided, made when they are first asked for.
+#[derive(Debug, Default)]
+pub(super) struct Tried {
+    pub(super) plane: OnceLock<Option<Carrier>>,
+    pub(super) carriers: OnceLock<Vec<Carrier>>,
+    /// Those that circles and straight lines of the outline fix.
+    pub(super) implied: OnceLock<Vec<Carrier>>,
+    pub(super) coons: OnceLock<Unfolded>,
+}

@@ -7,12 +7,12 @@
 
 mod cell;
 mod guard;
-mod heap;
 mod legal;
 mod net;
 mod partition;
 mod patch;
 mod quadric;
+mod queue;
 mod rounds;
 #[cfg(test)]
 mod tests;

@@ -40,6 +40,9 @@ use crate::util::ids::NONE;
 /// Rounding adds so much to a distance, as a share of the largest coordinate: a hundred times the error of the few sums of f64 that it is made of.
 const ROUNDING: f64 = 1e-13;
 
+/// Rounding may make a distance less by this share.
+const SHARE: f64 = 1e-9;
+
 /// A bound may be larger than the distance of the farthest vertex by this share before it is worth a search.
 const SLACK: f64 = 1.02;
 
@@ -59,9 +62,9 @@ pub(crate) struct Proved {
     pub searched: usize,
 }
 
-/// Proves bounds, and names the triangles of the first mesh that are, or may be, farther than `most`, or near to what is. O(n) where the meshes are alike.
+/// Proves bounds, and names the triangles of the first mesh that are, or may be, farther than `most`, or near to what is, with the bounds there. O(n) where the meshes are alike.
 /// If it is not to be `tight`, bounds are no better than `most`.
-pub(crate) fn prove(pairing: &Pairing<'_>, most: f64, tight: bool) -> (Proved, Vec<u32>) {
+pub(crate) fn prove(pairing: &Pairing<'_>, most: f64, tight: bool) -> (Proved, Vec<(u32, f64)>) {
     let surface = Surface::new(pairing.new_points, pairing.new_faces);
     let images: Vec<Option<(Spot, f64)>> =
         (0..pairing.points.len()).into_par_iter().with_min_len(BLOCK).map(|v| image(&surface, pairing, v)).collect();
@@ -72,9 +75,12 @@ pub(crate) fn prove(pairing: &Pairing<'_>, most: f64, tight: bool) -> (Proved, V
     }
     let covered: Vec<AtomicI64> = (0..pairing.new_faces.len()).map(|_| AtomicI64::new(0)).collect();
     let size = pairing.points.iter().chain(pairing.new_points).flatten().fold(0.0_f32, |m, x| m.max(x.abs()));
+    // What is found is made larger in the end.
+    let rounding = f64::from(size) * ROUNDING;
+    let most = ((most - rounding) / (1.0 + SHARE)).max(0.0);
     // As vertices are about so far, no bound can be much better; where a bound is wanted, no better one is needed.
     let farthest_vertex = images.par_iter().flatten().map(|image| image.1).reduce(|| 0.0, f64::max);
-    let least = (farthest_vertex * SLACK).max(f64::from(size) * ROUNDING);
+    let least = (farthest_vertex * SLACK).max(rounding);
     let aim = if most.is_finite() && !tight { most } else { least.min(most) };
     let map = Map { surface: &surface, pairing, images: &images, rim: &rim, covered: &covered, aim };
     let blocks = pairing.faces.len().div_ceil(BLOCK);
@@ -87,9 +93,9 @@ pub(crate) fn prove(pairing: &Pairing<'_>, most: f64, tight: bool) -> (Proved, V
     let (forward, mut far) = search::forward(&surface, pairing, &images, &failed, (aim, most));
     let (backward, under) = search::backward(&surface, pairing, &images, &bare, (aim, most));
     far.extend(under);
-    far.sort_unstable();
-    far.dedup();
-    let sure = |d: f64| if d > 0.0 { d * (1.0 + 1e-9) + f64::from(size) * ROUNDING } else { 0.0 };
+    far.sort_unstable_by(|a, b| a.0.cmp(&b.0).then(b.1.total_cmp(&a.1)));
+    far.dedup_by_key(|one| one.0);
+    let sure = |d: f64| if d > 0.0 { d * (1.0 + SHARE) + rounding } else { 0.0 };
     let proved = Proved {
         forward: sure(farthest.max(forward)),
         backward: sure(farthest.max(backward)),

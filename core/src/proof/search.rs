@@ -84,11 +84,12 @@ fn bounds(wanted: &[[DVec3; 3]], near: &[[Point; 3]], all: &[[u32; 3]], points: 
             [-1.0, 1.0].map(|sign| wanted[*i].map(|p| (p + sign * bounds[*i] * (1.0 + 1e-6)).to_array().map(|x| x as f32)));
         Bounds::of(&[lo, hi].concat())
     };
-    let boxes: Vec<Bounds> = left.iter().map(around).collect();
+    let boxes: Vec<Bounds> = left.iter().filter(|i| bounds[**i].is_finite()).map(around).collect();
+    let has_none = boxes.len() < left.len();
     let tree = BoxTree::new(&boxes);
     let corners = |face: &[u32; 3]| face.map(|v| points[v as usize]);
     let is_wanted = |t: &[Point; 3]| {
-        let mut is_met = false;
+        let mut is_met = has_none;
         tree.each_meeting(&Bounds::of(t), |_| is_met = true);
         is_met
     };
@@ -102,6 +103,9 @@ fn bounds(wanted: &[[DVec3; 3]], near: &[[Point; 3]], all: &[[u32; 3]], points: 
     bounds
 }
 
+/// Triangles of the first mesh, and the bounds of what is far there.
+pub(super) type Far = Vec<(u32, f64)>;
+
 /// Bounds the distance of triangles of the first mesh, and names those beyond the second of `aims`.
 pub(super) fn forward(
     surface: &Surface<'_>,
@@ -109,7 +113,7 @@ pub(super) fn forward(
     images: &[Option<(Spot, f64)>],
     failed: &[u32],
     (aim, most): (f64, f64),
-) -> (f64, Vec<u32>) {
+) -> (f64, Far) {
     if failed.is_empty() {
         return (0.0, Vec::new());
     }
@@ -121,7 +125,7 @@ pub(super) fn forward(
     let triangle = |f: &u32| pairing.faces[*f as usize].map(|v| place(pairing.points[v as usize]));
     let wanted: Vec<_> = failed.iter().map(triangle).collect();
     let bounds = bounds(&wanted, &near, surface.faces, surface.points, (aim, most));
-    let far = failed.iter().zip(&bounds).filter(|(_, bound)| **bound > most).map(|(f, _)| *f).collect();
+    let far = failed.iter().copied().zip(bounds.iter().copied()).filter(|(_, bound)| *bound > most).collect();
     (bounds.into_iter().fold(0.0, f64::max), far)
 }
 
@@ -142,7 +146,7 @@ pub(super) fn backward(
     images: &[Option<(Spot, f64)>],
     bare: &[u32],
     (aim, most): (f64, f64),
-) -> (f64, Vec<u32>) {
+) -> (f64, Far) {
     if bare.is_empty() {
         return (0.0, Vec::new());
     }
@@ -156,12 +160,22 @@ pub(super) fn backward(
     let near: Vec<_> = pairing.faces.par_iter().filter(|face| lies_on(face, &is_near)).map(corners).collect();
     let wanted: Vec<_> = bare.iter().map(|f| surface.corners(*f)).collect();
     let bounds = bounds(&wanted, &near, pairing.faces, pairing.points, (aim, most));
-    let mut is_beyond = vec![false; surface.faces.len()];
-    bare.iter().zip(&bounds).for_each(|(f, bound)| is_beyond[*f as usize] = *bound > most);
     let all = bounds.iter().copied().fold(0.0, f64::max);
     if all <= most {
         return (all, Vec::new());
     }
-    let far = (0..).zip(pairing.faces).filter(|(_, face)| lies_on(face, &is_beyond)).map(|(f, _)| f).collect();
-    (all, far)
+    let (mut of_faces, mut of_vertices) = (vec![0.0_f64; surface.faces.len()], vec![0.0_f64; surface.points.len()]);
+    for (f, bound) in bare.iter().zip(&bounds).filter(|(_, bound)| **bound > most) {
+        of_faces[*f as usize] = *bound;
+        for v in surface.faces[*f as usize] {
+            of_vertices[v as usize] = bound.max(of_vertices[v as usize]);
+        }
+    }
+    // A vertex lies on such a face, or has become a vertex of one: nothing may lie on the face.
+    let of_vertex = |v: u32| {
+        let on = images[v as usize].map_or(0.0, |image| of_faces[image.0.face as usize]);
+        pairing.became.get(v as usize).and_then(|w| of_vertices.get(*w as usize)).map_or(on, |of| on.max(*of))
+    };
+    let far = (0..).zip(pairing.faces).map(|(f, face)| (f, face.map(of_vertex).into_iter().fold(0.0, f64::max)));
+    (all, far.filter(|(_, bound)| *bound > most).collect())
 }

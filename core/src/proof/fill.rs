@@ -1,7 +1,7 @@
 //! The image of a triangle, by those of its edges: polygons that lie in one face each.
 //!
-//! The loop around the triangle is cut at places of it that lie in one face, the longest run of them first, until nothing is left. Where it runs around
-//! vertices of the surface, these are joined to the loop by spokes, and each sector is cut by itself.
+//! The loop around the triangle is cut at places of it that lie in one face, the longest run of them first, until nothing is left. Where it runs
+//! around vertices of the surface, these are joined to the loop by spokes, and each sector is cut by itself.
 
 use glam::DVec3;
 

@@ -91,8 +91,8 @@ impl Map<'_> {
         !(0..3).any(goes_inside)
     }
 
-    /// Where a triangle goes into the insides of two neighbouring faces, by one edge as near as is aimed at: its corner in the one, and the pairs on the
-    /// sides after and before that corner. The same ones as the search for a way finds; most triangles that go into more than one face are such.
+    /// Where a triangle goes into the insides of two neighbouring faces, by one edge as near as is aimed at: its corner in the one, and the pairs on
+    /// the sides after and before that corner. The same ones as the search for a way finds; most triangles that go into more than one face are such.
     #[inline]
     fn over_edge(&self, face: [u32; 3], spots: &[(Spot, f64); 3]) -> Option<(usize, [Pair; 2])> {
         let of = |k: usize| spots[k % 3].0.face;

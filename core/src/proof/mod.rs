@@ -62,7 +62,8 @@ pub(crate) struct Proved {
     pub searched: usize,
 }
 
-/// Proves bounds, and names the triangles of the first mesh that are, or may be, farther than `most`, or near to what is, with the bounds there. O(n) where the meshes are alike.
+/// Proves bounds, and names the triangles of the first mesh that are, or may be, farther than `most`, or near to what is, with the bounds there.
+/// O(n) where the meshes are alike.
 /// If it is not to be `tight`, bounds are no better than `most`.
 pub(crate) fn prove(pairing: &Pairing<'_>, most: f64, tight: bool) -> (Proved, Vec<(u32, f64)>) {
     let surface = Surface::new(pairing.new_points, pairing.new_faces);

@@ -72,8 +72,8 @@ impl Field {
     }
 }
 
-/// Bounds of the distances of triangles from others, of which some are known to be near; no better than the first of `aims` if they are below, and no better
-/// than that of the farthest place if that is not beyond the second one.
+/// Bounds of the distances of triangles from others, of which some are known to be near; no better than `aim` if they are below, and no better
+/// than the distance of the farthest corner if that is not beyond `most`.
 fn bounds(wanted: &[[DVec3; 3]], near: &[[Point; 3]], all: &[[u32; 3]], points: &[Point], (aim, most): (f64, f64)) -> Vec<f64> {
     let near = Field::new(near);
     let mut bounds: Vec<f64> = wanted.par_iter().with_max_len(16).map(|t| near.of_one(t, aim)).collect();

@@ -1,5 +1,6 @@
-//! Edges by what their collapse costs: in buckets, 16 for each doubling of the cost, the first come of a bucket first. Entries go stale when a vertex
-//! changes, and are thrown away when they come up. To add one and to take one are O(1); no cost is told from another one that is less than 7 % larger.
+//! Edges by what their collapse costs: in buckets, 16 for each doubling of the cost, the first come of a bucket first. Entries go stale when a
+//! vertex changes, and are thrown away when they come up. To add one and to take one are O(1), as a heap is not; a cost that is less than 7 %
+//! larger is not told from another one.
 
 use crate::util::ids::NONE;
 

@@ -29,17 +29,20 @@ pub(crate) fn cosine(a: DVec3, b: DVec3) -> f64 {
 }
 
 /// Where the point of the segment `a`–`b` that is nearest to `p` lies: 0 at `a`, 1 at `b`. 0 for a segment of no length.
+#[inline]
 pub(crate) fn share_along(p: DVec3, a: DVec3, b: DVec3) -> f64 {
     let (d, length) = (b - a, (b - a).length_squared());
     if length > 0.0 { ((p - a).dot(d) / length).clamp(0.0, 1.0) } else { 0.0 }
 }
 
 /// The point of the segment `a`–`b` that is nearest to `p`.
+#[inline]
 pub(crate) fn nearest_of_segment(a: DVec3, b: DVec3, p: DVec3) -> DVec3 {
     a + (b - a) * share_along(p, a, b)
 }
 
 /// The nearest points of two segments.
+#[inline]
 pub(crate) fn nearest_of_segments([a, b]: [DVec3; 2], [c, d]: [DVec3; 2]) -> (DVec3, DVec3) {
     let (u, v, w) = (b - a, d - c, a - c);
     let (uu, uv, vv, uw, vw) = (u.dot(u), u.dot(v), v.dot(v), u.dot(w), v.dot(w));
@@ -62,6 +65,7 @@ pub(crate) fn nearest_of_triangle(points: &[DVec3; 3], p: DVec3) -> DVec3 {
 }
 
 /// Squared distance of a point from a triangle (Ericson, Real-Time Collision Detection, 2005, 5.1.5: by the regions of its edges and face).
+#[inline]
 pub(crate) fn square_distance(p: DVec3, [a, b, c]: [DVec3; 3]) -> f64 {
     let to_edge = |a, b| (p - a - (b - a) * share_along(p, a, b)).length_squared();
     let rim = to_edge(a, b).min(to_edge(b, c)).min(to_edge(c, a));

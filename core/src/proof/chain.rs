@@ -43,16 +43,12 @@ pub(super) struct Lent {
 
 /// Appends what is between two ends; false if no short way was found.
 pub(super) fn between(surface: &Surface<'_>, [a, b]: [&Pair; 2], aim: f64, lent: &mut Lent, out: &mut Vec<Pair>) -> bool {
-    if surface.common(&[a.spot, b.spot]).is_some() {
+    if surface.common([&a.spot, &b.spot].into_iter()).is_some() {
         return true;
     }
-    // Nearly always the faces are neighbours, and the edge between them is as near as the ends.
-    if let Some(k) = (0..3).find(|k| surface.beyond(a.spot.face, *k) == Some(b.spot.face)) {
-        let pair = cross(surface, (a.spot.face, k), a.place, b.place);
-        if pair.off <= aim {
-            out.push(pair);
-            return true;
-        }
+    if let Some(pair) = over(surface, [a, b], aim) {
+        out.push(pair);
+        return true;
     }
     let Some(last) = search(surface, [a, b], aim, lent) else { return false };
     let Lent { reached, path, .. } = lent;
@@ -70,6 +66,13 @@ pub(super) fn between(surface: &Surface<'_>, [a, b]: [&Pair; 2], aim: f64, lent:
         out.push(pair);
     }
     true
+}
+
+/// The only pair between two ends, where their faces are neighbours, and the edge between them is as near as is aimed at: it nearly always is.
+#[inline]
+pub(super) fn over(surface: &Surface<'_>, [a, b]: [&Pair; 2], aim: f64) -> Option<Pair> {
+    let k = (0..3).find(|k| surface.beyond(a.spot.face, *k) == Some(b.spot.face))?;
+    Some(cross(surface, (a.spot.face, k), a.place, b.place)).filter(|pair| pair.off <= aim)
 }
 
 /// The faces from one end to the other, in `lent`; the place of the last one.
@@ -119,10 +122,26 @@ fn order(a: &[f64; 2], b: &[f64; 2]) -> Ordering {
 fn cross(surface: &Surface<'_>, (face, k): (u32, usize), from: DVec3, to: DVec3) -> Pair {
     let corners = surface.corners(face);
     let [p, q] = [corners[k], corners[(k + 1) % 3]];
-    let (place, near) = nearest_of_segments([from, to], [p, q]);
-    let t = share_along(near, p, q);
+    let (place, t, off) = nearest([from, to], [p, q]);
     let mut shares = [0.0; 3];
     (shares[k], shares[(k + 1) % 3]) = (1.0 - t, t);
-    let spot = Spot { face, shares };
-    Pair { place, spot, off: place.distance(surface.position(&spot)) }
+    Pair { place, spot: Spot { face, shares }, off }
+}
+
+/// The place of the first segment that is nearest to the second, the share of the second where that is, and the distance.
+#[inline]
+fn nearest([a, b]: [DVec3; 2], [c, d]: [DVec3; 2]) -> (DVec3, f64, f64) {
+    let (u, v, w) = (b - a, d - c, a - c);
+    let (uu, uv, vv, uw, vw) = (u.dot(u), u.dot(v), v.dot(v), u.dot(w), v.dot(w));
+    let det = uu * vv - uv * uv;
+    // Nearly always both are nearest within their ends.
+    let scale = det.recip();
+    let (s, t) = ((uv * vw - vv * uw) * scale, (uu * vw - uv * uw) * scale);
+    if det > 0.0 && s > 0.0 && s < 1.0 && t > 0.0 && t < 1.0 {
+        let place = a + u * s;
+        return (place, t, place.distance(c * (1.0 - t) + d * t));
+    }
+    let (place, near) = nearest_of_segments([a, b], [c, d]);
+    let t = share_along(near, c, d);
+    (place, t, place.distance(c * (1.0 - t) + d * t))
 }

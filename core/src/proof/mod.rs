@@ -17,6 +17,7 @@
 
 mod chain;
 mod fill;
+mod map;
 mod pairing;
 mod rim;
 mod search;
@@ -30,18 +31,17 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use crate::geometry::distance::place;
-use crate::proof::chain::{Lent, Pair};
-use crate::proof::fill::Piece;
+use crate::proof::map::{BLOCK, Found, Map, covers};
 pub(crate) use crate::proof::pairing::Pairing;
 use crate::proof::rim::Rims;
 use crate::proof::surface::{Spot, Surface, WALK};
 use crate::util::ids::NONE;
 
-/// The unit of sums of areas, as a share of a face: whole numbers, whose sum does not depend on their order.
-const UNIT: f64 = (1_u64 << 40) as f64;
-
 /// Rounding adds so much to a distance, as a share of the largest coordinate: a hundred times the error of the few sums of f64 that it is made of.
 const ROUNDING: f64 = 1e-13;
+
+/// Rounding may make a distance less by this share.
+const SHARE: f64 = 1e-9;
 
 /// A bound may be larger than the distance of the farthest vertex by this share before it is worth a search.
 const SLACK: f64 = 1.02;
@@ -50,9 +50,6 @@ const SLACK: f64 = 1.02;
 const SAMPLE: usize = 8;
 const FARTHEST: usize = 500;
 const RINGS: usize = 3;
-
-/// Triangles that a thread takes at once.
-const BLOCK: usize = 1 << 12;
 
 /// Bounds of distances, in the unit of the points.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -65,18 +62,10 @@ pub(crate) struct Proved {
     pub searched: usize,
 }
 
-/// Facts of a block of triangles.
-#[derive(Default)]
-struct Found {
-    farthest: f64,
-    failed: Vec<u32>,
-    /// Faces in which the rim of failed triangles runs, or what is too far goes.
-    rims: Vec<u32>,
-}
-
-/// Proves bounds, and names the triangles of the first mesh that are, or may be, farther than `most`, or near to what is. O(n) where the meshes are alike.
+/// Proves bounds, and names the triangles of the first mesh that are, or may be, farther than `most`, or near to what is, with the bounds there.
+/// O(n) where the meshes are alike.
 /// If it is not to be `tight`, bounds are no better than `most`.
-pub(crate) fn prove(pairing: &Pairing<'_>, most: f64, tight: bool) -> (Proved, Vec<u32>) {
+pub(crate) fn prove(pairing: &Pairing<'_>, most: f64, tight: bool) -> (Proved, Vec<(u32, f64)>) {
     let surface = Surface::new(pairing.new_points, pairing.new_faces);
     let images: Vec<Option<(Spot, f64)>> =
         (0..pairing.points.len()).into_par_iter().with_min_len(BLOCK).map(|v| image(&surface, pairing, v)).collect();
@@ -87,9 +76,12 @@ pub(crate) fn prove(pairing: &Pairing<'_>, most: f64, tight: bool) -> (Proved, V
     }
     let covered: Vec<AtomicI64> = (0..pairing.new_faces.len()).map(|_| AtomicI64::new(0)).collect();
     let size = pairing.points.iter().chain(pairing.new_points).flatten().fold(0.0_f32, |m, x| m.max(x.abs()));
+    // What is found is made larger in the end.
+    let rounding = f64::from(size) * ROUNDING;
+    let most = ((most - rounding) / (1.0 + SHARE)).max(0.0);
     // As vertices are about so far, no bound can be much better; where a bound is wanted, no better one is needed.
     let farthest_vertex = images.par_iter().flatten().map(|image| image.1).reduce(|| 0.0, f64::max);
-    let least = (farthest_vertex * SLACK).max(f64::from(size) * ROUNDING);
+    let least = (farthest_vertex * SLACK).max(rounding);
     let aim = if most.is_finite() && !tight { most } else { least.min(most) };
     let map = Map { surface: &surface, pairing, images: &images, rim: &rim, covered: &covered, aim };
     let blocks = pairing.faces.len().div_ceil(BLOCK);
@@ -102,21 +94,15 @@ pub(crate) fn prove(pairing: &Pairing<'_>, most: f64, tight: bool) -> (Proved, V
     let (forward, mut far) = search::forward(&surface, pairing, &images, &failed, (aim, most));
     let (backward, under) = search::backward(&surface, pairing, &images, &bare, (aim, most));
     far.extend(under);
-    far.sort_unstable();
-    far.dedup();
-    let sure = |d: f64| if d > 0.0 { d * (1.0 + 1e-9) + f64::from(size) * ROUNDING } else { 0.0 };
+    far.sort_unstable_by(|a, b| a.0.cmp(&b.0).then(b.1.total_cmp(&a.1)));
+    far.dedup_by_key(|one| one.0);
+    let sure = |d: f64| if d > 0.0 { d * (1.0 + SHARE) + rounding } else { 0.0 };
     let proved = Proved {
         forward: sure(farthest.max(forward)),
         backward: sure(farthest.max(backward)),
         searched: failed.len() + bare.len(),
     };
     (proved, far)
-}
-
-/// Is a sum of areas a degree that is not zero?
-fn covers(sum: i64) -> bool {
-    let degree = sum as f64 / UNIT;
-    degree.round() != 0.0 && (degree - degree.round()).abs() < 0.01
 }
 
 /// The spot for a vertex: itself if it is still there, else the nearest one of those around what it became, and from there on.
@@ -202,179 +188,4 @@ fn walk(surface: &Surface<'_>, p: DVec3, mut best: (Spot, f64)) -> (Spot, f64) {
         best = next;
     }
     best
-}
-
-/// All that a triangle is mapped by.
-struct Map<'m> {
-    surface: &'m Surface<'m>,
-    pairing: &'m Pairing<'m>,
-    images: &'m [Option<(Spot, f64)>],
-    rim: &'m Rims,
-    covered: &'m [AtomicI64],
-    aim: f64,
-}
-
-/// Lists lent to many triangles.
-#[derive(Default)]
-struct Scratch {
-    chain: Lent,
-    rim: Vec<Pair>,
-    piece: Vec<Pair>,
-    /// Polygons: their faces, and the ends of their spots in the list.
-    pieces: Vec<(u32, usize)>,
-    spots: Vec<Spot>,
-}
-
-impl Map<'_> {
-    /// Maps a block of triangles.
-    fn block(&self, block: usize) -> Found {
-        let (mut found, mut lent) = (Found::default(), Scratch::default());
-        for f in block * BLOCK..self.pairing.faces.len().min((block + 1) * BLOCK) {
-            let face = self.pairing.faces[f];
-            let [Some(a), Some(b), Some(c)] = face.map(|v| self.images[v as usize]) else {
-                found.failed.push(f as u32);
-                continue;
-            };
-            let farthest = a.1.max(b.1).max(c.1);
-            if let Some(common) = self.surface.common(&[a.0, b.0, c.0]).filter(|_| self.keeps_rim(face, [a.0, b.0, c.0])) {
-                add(self.surface, self.covered, common, &[a.0, b.0, c.0]);
-                if farthest > self.aim {
-                    found.failed.push(f as u32);
-                    found.rims.push(common);
-                } else {
-                    found.farthest = found.farthest.max(farthest);
-                }
-            } else {
-                self.across(f as u32, (face, [a, b, c]), &mut lent, &mut found);
-            }
-        }
-        found
-    }
-
-    /// Do the sides that are of the rim go onto edges?
-    fn keeps_rim(&self, face: [u32; 3], spots: [Spot; 3]) -> bool {
-        let goes_inside = |k: usize| {
-            let next = (k + 1) % 3;
-            self.rim.has(face[k], face[next]) && !rim::on_edge(self.surface, &[spots[k], spots[next]])
-        };
-        !(0..3).any(goes_inside)
-    }
-
-    /// Maps a triangle that does not go into one face.
-    fn across(&self, f: u32, of: ([u32; 3], [(Spot, f64); 3]), lent: &mut Scratch, found: &mut Found) {
-        let Scratch { pieces, spots, .. } = lent;
-        pieces.clear();
-        spots.clear();
-        let farthest = self.cut(of, lent, found);
-        if farthest.is_none() {
-            found.failed.push(f);
-            self.rims(of, &mut lent.chain, &mut found.rims);
-            return;
-        }
-        let mut start = 0;
-        for (face, end) in &lent.pieces {
-            add(self.surface, self.covered, *face, &lent.spots[start..*end]);
-            start = *end;
-        }
-        match farthest.filter(|d| *d <= self.aim) {
-            Some(d) => found.farthest = found.farthest.max(d),
-            None => {
-                // It covers what it covers, but from too far.
-                found.failed.push(f);
-                found.rims.extend(lent.pieces.iter().map(|piece| piece.0));
-            }
-        }
-    }
-
-    /// Appends what is between two ends of a side; false if there is no way. Where the rim goes into faces, these are named.
-    fn side(
-        &self,
-        ([from, to], is_rim): ([&Pair; 2], bool),
-        chain: &mut Lent,
-        out: &mut Vec<Pair>,
-        inside: &mut Vec<u32>,
-    ) -> bool {
-        if is_rim && rim::between(self.surface, [from, to], out) {
-            return true;
-        }
-        let start = out.len();
-        if !chain::between(self.surface, [from, to], self.aim, chain, out) {
-            return false;
-        }
-        if is_rim {
-            inside.extend(self.faces_along([from, to], &out[start..]));
-        }
-        true
-    }
-
-    /// The faces from one spot to the next.
-    fn faces_along(&self, [from, to]: [&Pair; 2], between: &[Pair]) -> Vec<u32> {
-        let mut spots = vec![from.spot];
-        spots.extend(between.iter().map(|pair| pair.spot));
-        spots.push(to.spot);
-        spots.windows(2).filter_map(|two| self.surface.common(two)).collect()
-    }
-
-    /// Cuts a triangle that does not go into one face into pieces, in `lent`; returns how far its farthest corner or cut goes, if it can be mapped.
-    fn cut(&self, (face, spots): ([u32; 3], [(Spot, f64); 3]), lent: &mut Scratch, found: &mut Found) -> Option<f64> {
-        let Scratch { chain, rim, piece, pieces, spots: all } = lent;
-        rim.clear();
-        for (k, (from, to, turned)) in sides(self.pairing, face, spots).into_iter().enumerate() {
-            rim.push(if turned { to } else { from });
-            let start = rim.len();
-            let is_rim = self.rim.has(face[k], face[(k + 1) % 3]);
-            if !self.side(([&from, &to], is_rim), chain, rim, &mut found.rims) {
-                return None;
-            }
-            if turned {
-                rim[start..].reverse();
-            }
-        }
-        let triangle = face.map(|v| place(self.pairing.points[v as usize]));
-        let mut farthest = 0.0_f64;
-        let is_mapped = fill::fill(self.surface, &triangle, rim, piece, &mut |part: Piece<'_>| {
-            all.extend(part.corners.iter().map(|pair| pair.spot));
-            farthest = part.corners.iter().map(|pair| pair.off).fold(farthest, f64::max);
-            pieces.push((part.face, all.len()));
-        });
-        is_mapped.then_some(farthest)
-    }
-
-    /// The faces in which the sides of a triangle run.
-    fn rims(&self, (face, spots): ([u32; 3], [(Spot, f64); 3]), lent: &mut Lent, out: &mut Vec<u32>) {
-        for (from, to, _) in sides(self.pairing, face, spots) {
-            let mut between = Vec::new();
-            // Where there is no way, the triangle beyond fails as well, and no rim runs there.
-            if chain::between(self.surface, [&from, &to], self.aim, lent, &mut between) {
-                out.extend(self.faces_along([&from, &to], &between));
-            }
-        }
-    }
-}
-
-/// Adds the signed area of a polygon in a face, as a share of that of the face.
-fn add(surface: &Surface<'_>, covered: &[AtomicI64], face: u32, spots: &[Spot]) {
-    let mut sum = 0.0;
-    let (mut first, mut last): (Option<[f64; 3]>, Option<[f64; 3]>) = (None, None);
-    for shares in spots.iter().filter_map(|spot| surface.within(spot, face)) {
-        if let Some(before) = last {
-            sum += before[1] * shares[2] - before[2] * shares[1];
-        } else {
-            first = Some(shares);
-        }
-        last = Some(shares);
-    }
-    if let (Some(first), Some(last)) = (first, last) {
-        sum += last[1] * first[2] - last[2] * first[1];
-    }
-    covered[face as usize].fetch_add((sum * UNIT) as i64, Ordering::Relaxed);
-}
-
-/// The ends of the sides of a triangle, with the smaller vertex first, and whether that turns them round.
-fn sides(pairing: &Pairing<'_>, face: [u32; 3], spots: [(Spot, f64); 3]) -> [(Pair, Pair, bool); 3] {
-    let pair = |k: usize| Pair { place: place(pairing.points[face[k % 3] as usize]), spot: spots[k % 3].0, off: spots[k % 3].1 };
-    [0, 1, 2].map(|k| {
-        let turned = face[k] > face[(k + 1) % 3];
-        if turned { (pair(k + 1), pair(k), true) } else { (pair(k), pair(k + 1), false) }
-    })
 }

@@ -2,8 +2,6 @@
 //!
 //! The distance from a triangle is a convex function, so that no place of another triangle is farther from it than the farthest corner is.
 
-use std::sync::OnceLock;
-
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -17,6 +15,9 @@ use crate::proof::surface::{Spot, Surface};
 /// How often a triangle is cut into four.
 const DEPTH: usize = 5;
 
+/// The bound of all triangles is not much better than that of a place of one of them: no search goes on for less.
+const SLACK: f64 = 1.02;
+
 /// Triangles to be near to.
 struct Field {
     triangles: Vec<[DVec3; 3]>,
@@ -24,9 +25,9 @@ struct Field {
 }
 
 impl Field {
-    fn new(triangles: Vec<[Point; 3]>) -> Self {
+    fn new(triangles: &[[Point; 3]]) -> Self {
         let boxes: Vec<Bounds> = triangles.iter().map(|t| Bounds::of(t)).collect();
-        Self { triangles: triangles.into_iter().map(|t| t.map(place)).collect(), tree: BoxTree::new(&boxes) }
+        Self { triangles: triangles.iter().map(|t| t.map(place)).collect(), tree: BoxTree::new(&boxes) }
     }
 
     /// A bound of the distance of a triangle's places, no better than `aim` if it is below.
@@ -41,19 +42,28 @@ impl Field {
         parts.iter().map(|part| self.bound(part, aim, depth - 1)).fold(0.0, f64::max).min(one)
     }
 
-    /// The least of the distances from single triangles.
-    fn of_one(&self, t: &[DVec3; 3], aim: f64) -> f64 {
-        let size = t.iter().flat_map(|p| p.to_array()).fold(1e-30, |m: f64, x| m.max(x.abs()));
+    /// The least of the distances from single triangles: of each, that of the farthest of some places.
+    fn of_one(&self, places: &[DVec3], aim: f64) -> f64 {
+        let Some(first) = places.first() else { return 0.0 };
+        let size = places.iter().flat_map(|p| p.to_array()).fold(1e-30, |m: f64, x| m.max(x.abs()));
         let mut reach = aim.max(size * 1e-7);
-        let mut found = Vec::new();
         while !self.triangles.is_empty() {
-            let around = |p: &DVec3| [(*p - reach), (*p + reach)].map(|q| q.to_array().map(|x| x as f32));
             // Near to its first corner, as what it is near to is near to each corner.
-            let [lo, hi] = around(&t[0]);
-            self.tree.meeting(&Bounds::of(&[lo, hi]), &mut found);
-            let farthest = |i: &u32| t.iter().map(|p| square_distance(*p, self.triangles[*i as usize])).fold(0.0, f64::max);
-            let least = found.iter().map(farthest).fold(f64::INFINITY, f64::min).sqrt();
-            if least <= reach || found.len() == self.triangles.len() {
+            let [lo, hi] = [*first - reach, *first + reach].map(|q| q.to_array().map(|x| x as f32));
+            let (mut least, mut count) = (f64::INFINITY, 0);
+            self.tree.each_meeting(&Bounds::of(&[lo, hi]), |i| {
+                count += 1;
+                let mut farthest = 0.0_f64;
+                for p in places {
+                    farthest = farthest.max(square_distance(*p, self.triangles[i as usize]));
+                    if farthest >= least {
+                        return;
+                    }
+                }
+                least = farthest;
+            });
+            let least = least.sqrt();
+            if least <= reach || count == self.triangles.len() {
                 return least;
             }
             reach *= 4.0;
@@ -62,22 +72,39 @@ impl Field {
     }
 }
 
-/// A field of what is near, and one of all, which is made when the first one is not enough.
-struct Fields {
-    near: Field,
-    all: OnceLock<Field>,
+/// Bounds of the distances of triangles from others, of which some are known to be near; no better than `aim` if they are below, and no better
+/// than the distance of the farthest corner if that is not beyond `most`.
+fn bounds(wanted: &[[DVec3; 3]], near: &[[Point; 3]], all: &[[u32; 3]], points: &[Point], (aim, most): (f64, f64)) -> Vec<f64> {
+    let near = Field::new(near);
+    let mut bounds: Vec<f64> = wanted.par_iter().with_max_len(16).map(|t| near.of_one(t, aim)).collect();
+    let left: Vec<usize> = (0..wanted.len()).filter(|i| bounds[*i] > aim).collect();
+    // No triangle beyond its bound can better it.
+    let around = |i: &usize| {
+        let [lo, hi] =
+            [-1.0, 1.0].map(|sign| wanted[*i].map(|p| (p + sign * bounds[*i] * (1.0 + 1e-6)).to_array().map(|x| x as f32)));
+        Bounds::of(&[lo, hi].concat())
+    };
+    let boxes: Vec<Bounds> = left.iter().filter(|i| bounds[**i].is_finite()).map(around).collect();
+    let has_none = boxes.len() < left.len();
+    let tree = BoxTree::new(&boxes);
+    let corners = |face: &[u32; 3]| face.map(|v| points[v as usize]);
+    let is_wanted = |t: &[Point; 3]| {
+        let mut is_met = has_none;
+        tree.each_meeting(&Bounds::of(t), |_| is_met = true);
+        is_met
+    };
+    let field: Vec<[Point; 3]> = all.par_iter().with_min_len(1 << 10).map(corners).filter(is_wanted).collect();
+    let field = Field::new(&field);
+    let farthest_place = |i: &usize| wanted[*i].iter().map(|p| field.of_one(&[*p], aim)).fold(0.0, f64::max);
+    let farthest = left.par_iter().with_max_len(16).map(farthest_place).reduce(|| 0.0, f64::max);
+    let aim = aim.max((farthest * SLACK).min(most));
+    let better: Vec<f64> = left.par_iter().with_max_len(16).map(|i| field.bound(&wanted[*i], aim, DEPTH)).collect();
+    left.iter().zip(better).for_each(|(i, better)| bounds[*i] = bounds[*i].min(better));
+    bounds
 }
 
-impl Fields {
-    fn new(near: Vec<[Point; 3]>) -> Self {
-        Self { near: Field::new(near), all: OnceLock::new() }
-    }
-
-    fn bound(&self, t: &[DVec3; 3], aim: f64, all: impl FnOnce() -> Vec<[Point; 3]>) -> f64 {
-        let near = self.near.bound(t, aim, DEPTH);
-        if near <= aim { near } else { near.min(self.all.get_or_init(|| Field::new(all())).bound(t, aim, DEPTH)) }
-    }
-}
+/// Triangles of the first mesh, and the bounds of what is far there.
+pub(super) type Far = Vec<(u32, f64)>;
 
 /// Bounds the distance of triangles of the first mesh, and names those beyond the second of `aims`.
 pub(super) fn forward(
@@ -86,7 +113,7 @@ pub(super) fn forward(
     images: &[Option<(Spot, f64)>],
     failed: &[u32],
     (aim, most): (f64, f64),
-) -> (f64, Vec<u32>) {
+) -> (f64, Far) {
     if failed.is_empty() {
         return (0.0, Vec::new());
     }
@@ -94,14 +121,11 @@ pub(super) fn forward(
     let mut is_near = vec![false; surface.faces.len()];
     own.filter_map(|v| images[v as usize]).for_each(|image| is_near[image.0.face as usize] = true);
     let corners = |face: &[u32; 3]| face.map(|v| surface.points[v as usize]);
-    let near = around(surface, is_near).into_iter().map(|f| corners(&surface.faces[f as usize])).collect();
-    let fields = Fields::new(near);
-    let bound = |f: &u32| {
-        let t = pairing.faces[*f as usize].map(|v| place(pairing.points[v as usize]));
-        fields.bound(&t, aim, || surface.faces.iter().map(corners).collect())
-    };
-    let bounds: Vec<f64> = failed.par_iter().with_max_len(16).map(bound).collect();
-    let far = failed.iter().zip(&bounds).filter(|(_, bound)| **bound > most).map(|(f, _)| *f).collect();
+    let near: Vec<_> = around(surface, is_near).into_iter().map(|f| corners(&surface.faces[f as usize])).collect();
+    let triangle = |f: &u32| pairing.faces[*f as usize].map(|v| place(pairing.points[v as usize]));
+    let wanted: Vec<_> = failed.iter().map(triangle).collect();
+    let bounds = bounds(&wanted, &near, surface.faces, surface.points, (aim, most));
+    let far = failed.iter().copied().zip(bounds.iter().copied()).filter(|(_, bound)| *bound > most).collect();
     (bounds.into_iter().fold(0.0, f64::max), far)
 }
 
@@ -122,7 +146,7 @@ pub(super) fn backward(
     images: &[Option<(Spot, f64)>],
     bare: &[u32],
     (aim, most): (f64, f64),
-) -> (f64, Vec<u32>) {
+) -> (f64, Far) {
     if bare.is_empty() {
         return (0.0, Vec::new());
     }
@@ -133,15 +157,25 @@ pub(super) fn backward(
     let lies_on =
         |face: &[u32; 3], set: &[bool]| face.iter().any(|v| images[*v as usize].is_some_and(|image| set[image.0.face as usize]));
     let corners = |face: &[u32; 3]| face.map(|v| pairing.points[v as usize]);
-    let fields = Fields::new(pairing.faces.par_iter().filter(|face| lies_on(face, &is_near)).map(corners).collect());
-    let bound = |f: &u32| fields.bound(&surface.corners(*f), aim, || pairing.faces.iter().map(corners).collect());
-    let bounds: Vec<f64> = bare.par_iter().with_max_len(16).map(bound).collect();
-    let mut is_beyond = vec![false; surface.faces.len()];
-    bare.iter().zip(&bounds).for_each(|(f, bound)| is_beyond[*f as usize] = *bound > most);
+    let near: Vec<_> = pairing.faces.par_iter().filter(|face| lies_on(face, &is_near)).map(corners).collect();
+    let wanted: Vec<_> = bare.iter().map(|f| surface.corners(*f)).collect();
+    let bounds = bounds(&wanted, &near, pairing.faces, pairing.points, (aim, most));
     let all = bounds.iter().copied().fold(0.0, f64::max);
     if all <= most {
         return (all, Vec::new());
     }
-    let far = (0..).zip(pairing.faces).filter(|(_, face)| lies_on(face, &is_beyond)).map(|(f, _)| f).collect();
-    (all, far)
+    let (mut of_faces, mut of_vertices) = (vec![0.0_f64; surface.faces.len()], vec![0.0_f64; surface.points.len()]);
+    for (f, bound) in bare.iter().zip(&bounds).filter(|(_, bound)| **bound > most) {
+        of_faces[*f as usize] = *bound;
+        for v in surface.faces[*f as usize] {
+            of_vertices[v as usize] = bound.max(of_vertices[v as usize]);
+        }
+    }
+    // A vertex lies on such a face, or has become a vertex of one: nothing may lie on the face.
+    let of_vertex = |v: u32| {
+        let on = images[v as usize].map_or(0.0, |image| of_faces[image.0.face as usize]);
+        pairing.became.get(v as usize).and_then(|w| of_vertices.get(*w as usize)).map_or(on, |of| on.max(*of))
+    };
+    let far = (0..).zip(pairing.faces).map(|(f, face)| (f, face.map(of_vertex).into_iter().fold(0.0, f64::max)));
+    (all, far.filter(|(_, bound)| *bound > most).collect())
 }

@@ -1,9 +1,11 @@
 //! A surface to be mapped to: its faces around vertices, and places on it that are known by vertices, so that what is common to faces is exactly common.
 
 use glam::DVec3;
+use rayon::prelude::*;
 
 use crate::geometry::distance::{place, share_along};
 use crate::geometry::exact::Point;
+use crate::util::ids::NONE;
 
 /// Steps from face to face towards the nearest one, at most.
 pub(crate) const WALK: usize = 24;
@@ -14,6 +16,8 @@ pub(super) struct Surface<'a> {
     pub(super) faces: &'a [[u32; 3]],
     starts: Vec<u32>,
     around: Vec<u32>,
+    /// The face beyond each edge, from corner k of a face on, [`NONE`] where there is none, or more than one.
+    beyond: Vec<[u32; 3]>,
 }
 
 /// A place on a face: shares of its corners, none negative; those that are zero are exactly so.
@@ -23,8 +27,16 @@ pub(super) struct Spot {
     pub(super) shares: [f64; 3],
 }
 
+impl Spot {
+    /// Does it lie on no edge of its face?
+    #[inline]
+    pub(super) fn is_inner(&self) -> bool {
+        self.shares.iter().all(|share| *share > 0.0)
+    }
+}
+
 impl<'a> Surface<'a> {
-    /// O(n).
+    /// O(n), where one end of each edge has a bounded number of faces.
     pub(super) fn new(points: &'a [Point], faces: &'a [[u32; 3]]) -> Self {
         let mut starts = vec![0_u32; points.len() + 1];
         faces.as_flattened().iter().for_each(|v| starts[*v as usize] += 1);
@@ -41,7 +53,22 @@ impl<'a> Surface<'a> {
                 around[*at as usize] = f as u32;
             }
         }
-        Self { points, faces, starts, around }
+        let mut surface = Self { points, faces, starts, around, beyond: Vec::new() };
+        let of_face = |f: usize| [0, 1, 2].map(|k| surface.look_beyond(f as u32, k));
+        surface.beyond = (0..faces.len()).into_par_iter().with_min_len(1 << 10).map(of_face).collect();
+        surface
+    }
+
+    /// Looks for the one face beyond the edge from corner `k` of a face on, around the end that has fewer faces.
+    fn look_beyond(&self, face: u32, k: usize) -> u32 {
+        let ends = [self.faces[face as usize][k], self.faces[face as usize][(k + 1) % 3]];
+        let [(near, other), (far, first)] = [(ends[0], ends[1]), (ends[1], ends[0])];
+        let (hub, other) = if self.around(near).len() <= self.around(far).len() { (near, other) } else { (far, first) };
+        let mut others = self.around(hub).iter().copied().filter(|f| *f != face && self.faces[*f as usize].contains(&other));
+        match (others.next(), others.next()) {
+            (Some(one), None) => one,
+            _ => NONE,
+        }
     }
 
     /// The faces around a vertex, by number.
@@ -75,7 +102,7 @@ impl<'a> Surface<'a> {
         if spot.face == face {
             return Some(spot.shares);
         }
-        if spot.shares.iter().all(|s| *s > 0.0) {
+        if spot.is_inner() {
             return None;
         }
         let (from, to) = (self.faces[spot.face as usize], self.faces[face as usize]);
@@ -90,15 +117,18 @@ impl<'a> Surface<'a> {
 
     /// A face in which all these spots lie.
     #[inline]
-    pub(super) fn common(&self, spots: &[Spot]) -> Option<u32> {
-        let first = spots.first()?;
-        let holds = |face: u32| spots.iter().all(|spot| self.within(spot, face).is_some());
-        if spots.iter().all(|spot| spot.face == first.face) || holds(first.face) {
+    pub(super) fn common<'s>(&self, spots: impl Iterator<Item = &'s Spot> + Clone) -> Option<u32> {
+        let first = spots.clone().next()?;
+        if spots.clone().all(|spot| spot.face == first.face) {
             return Some(first.face);
         }
+        let holds = |face: u32| spots.clone().all(|spot| self.within(spot, face).is_some());
         // Where one lies inside a face, there is no other one; else all are around a vertex of the first.
-        if let Some(inner) = spots.iter().find(|spot| spot.shares.iter().all(|s| *s > 0.0)) {
+        if let Some(inner) = spots.clone().find(|spot| spot.is_inner()) {
             return holds(inner.face).then_some(inner.face);
+        }
+        if holds(first.face) {
+            return Some(first.face);
         }
         let k = first.shares.iter().position(|s| *s > 0.0)?;
         self.around(self.faces[first.face as usize][k]).iter().copied().find(|face| holds(*face))
@@ -117,11 +147,10 @@ impl<'a> Surface<'a> {
     }
 
     /// The face beyond the edge from corner `k` of a face on, if there is one, and only one.
+    #[inline]
     pub(super) fn beyond(&self, face: u32, k: usize) -> Option<u32> {
-        let [p, q] = [self.faces[face as usize][k], self.faces[face as usize][(k + 1) % 3]];
-        let mut others = self.around(p).iter().copied().filter(|f| *f != face && self.faces[*f as usize].contains(&q));
-        let one = others.next()?;
-        others.next().is_none().then_some(one)
+        let one = self.beyond[face as usize][k];
+        (one != NONE).then_some(one)
     }
 
     /// The spot of a face that is nearest to a place, and the square of its distance.

@@ -130,3 +130,38 @@ fn a_rim_goes_onto_the_rim() {
     let (proved, _) = prove(&pairing, f64::INFINITY, true);
     assert!(proved.forward < 1e-9 && proved.backward < 1e-9 && proved.searched == 0, "{proved:?}");
 }
+
+/// A square of two triangles on a finer one, whose vertices lie within them and on the edge between: spokes join them, and nothing is searched.
+#[test]
+fn a_triangle_covers_vertices_of_a_finer_surface() {
+    let (new_points, new_faces) = grid(4, |_| 0.0);
+    let became = [0, 4, 20, 24];
+    let points = became.map(|v: u32| new_points[v as usize]);
+    for faces in [[[0, 1, 3], [0, 3, 2]], [[0, 1, 2], [1, 3, 2]]] {
+        let open = any_of(points.len());
+        let pairing = Pairing {
+            points: &points,
+            faces: &faces,
+            new_points: &new_points,
+            new_faces: &new_faces,
+            became: &became,
+            open: &open,
+        };
+        let (proved, _) = prove(&pairing, f64::INFINITY, true);
+        assert!(proved.forward < 1e-9 && proved.backward < 1e-9 && proved.searched == 0, "{proved:?}");
+    }
+}
+
+/// A square that has got a fin: no vertex of the square lies on it, but two have become its corners, so that both triangles are named.
+#[test]
+fn what_is_far_is_named_though_nothing_lies_on_it() {
+    let (points, faces) = grid(1, |_| 0.0);
+    let new_points = [&points[..], &[[0.5, 0.0, 5.0]]].concat();
+    let new_faces = [&faces[..], &[[0, 1, 4]]].concat();
+    let (became, open) = ([0, 1, 2, 3], any_of(points.len()));
+    let pairing =
+        Pairing { points: &points, faces: &faces, new_points: &new_points, new_faces: &new_faces, became: &became, open: &open };
+    let (proved, far) = prove(&pairing, 1.0, false);
+    assert!(proved.backward >= 5.0, "{proved:?}");
+    assert!(far.len() == 2 && (0..).zip(&far).all(|(f, one)| one.0 == f && one.1 > 4.999), "{far:?}");
+}

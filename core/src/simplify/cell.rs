@@ -8,10 +8,10 @@ use crate::geometry::exact::Point;
 use crate::geometry::sums::Bounds;
 use crate::geometry::tri_tri::{Triangle, do_cross};
 use crate::simplify::guard::Guard;
-use crate::simplify::heap::{Entry, Heap};
 use crate::simplify::legal::{self, Marks};
 use crate::simplify::partition;
 use crate::simplify::patch::{CREASE, FIXED, MOST, Patch, RIM, Star};
+use crate::simplify::queue::{Entry, Queue};
 
 /// A short edge is cheaper by this share of its length, squared, where surfaces are flat, so that triangles stay round.
 const STABILITY: f64 = 1e-3;
@@ -43,10 +43,10 @@ pub(super) struct Work {
     /// Edges were left alone because of what their quadrics would be.
     pub(super) is_limited: bool,
     rules: Rules,
-    heap: Heap,
+    queue: Queue,
     guard: Option<Guard>,
     marks: Marks,
-    stars: [Star; 3],
+    stars: [Star; 2],
 }
 
 impl Work {
@@ -60,41 +60,37 @@ impl Work {
     ) -> Self {
         let guard = is_guarded.then(|| Guard::new(&patch, obstacles.iter().map(|o| o.1).collect()));
         let marks = Marks::new(patch.points.len());
-        let mut work = Self {
-            patch,
-            cell,
-            obstacles,
-            outer,
-            is_limited: false,
-            rules,
-            heap: Heap::default(),
-            guard,
-            marks,
-            stars: Default::default(),
-        };
-        let mut entries = Vec::with_capacity(work.patch.corners.len() / 2);
+        let queue = Queue::new(patch.corners.len());
+        let mut work =
+            Self { patch, cell, obstacles, outer, is_limited: false, rules, queue, guard, marks, stars: Default::default() };
         for corner in 0..work.patch.corners.len() {
             let after = if corner % 3 == 2 { corner - 2 } else { corner + 1 };
             let ends = [work.patch.corners[corner], work.patch.corners[after]];
             // An edge of a vertex that is not fixed has two triangles, and is seen both ways; or it may be of the rim.
             let may_be_rim = || ends.iter().all(|v| work.patch.kinds[*v as usize] >= RIM);
             if ends[0] < ends[1] || may_be_rim() {
-                entries.extend(work.entry(ends));
+                work.enter(ends);
             }
         }
-        work.heap = Heap::new(entries);
         work
     }
 
-    fn entry(&mut self, ends: [u32; 2]) -> Option<Entry> {
-        let (value, cost, _) = self.price(ends)?;
+    /// Puts an edge into the queue, at what it costs now.
+    #[inline]
+    fn enter(&mut self, ends: [u32; 2]) {
+        let Some((value, cost, _)) = self.price(ends) else { return };
         let strict = ends.iter().map(|v| usize::from(self.patch.strict[*v as usize])).fold(0, usize::max);
         if value > self.rules.limits[strict.min(LIMITS - 1)] {
             self.is_limited = true;
-            return None;
+            return;
         }
-        let version = ends.iter().fold(0_u32, |sum, v| sum.wrapping_add(self.patch.versions[*v as usize]));
-        Some(Entry { cost: cost as f32, ends, version })
+        self.queue.push(cost as f32, Entry { ends, version: self.version(ends) });
+    }
+
+    /// The sum of the versions of both ends.
+    #[inline]
+    fn version(&self, [u, v]: [u32; 2]) -> u32 {
+        self.patch.versions[u as usize].wrapping_add(self.patch.versions[v as usize])
     }
 
     /// The quadric's value by its weight, the cost, and the best place for the vertex that two become. The first one is no freer than the second.
@@ -118,43 +114,45 @@ impl Work {
             let (value, cost) = cost(x);
             return Some((value, cost, point));
         }
-        let mut best = (cost(DVec3::ZERO), patch.points[i]);
-        let other = cost(edge);
-        if other.1 < best.0.1 {
-            best = (other, patch.points[j]);
-        }
         let rounded = |x: DVec3| (from + x).to_array().map(|x| x as f32 + 0.0);
         let least = (self.rules.optimal && kinds[0] != CREASE)
             .then(|| sum.least(2.0 * STABILITY * STABILITY, 0.5 * edge))
             .filter(|x| x.length_squared() < 4.0 * edge.length_squared());
-        let x = least.unwrap_or(0.5 * edge);
-        let other = cost(x);
-        if other.1 < best.0.1 {
-            best = (other, rounded(x));
+        if let Some(x) = least {
+            // The cost is least there, so that the ends need not be looked at.
+            let (value, cost) = cost(x);
+            return Some((value, cost, rounded(x)));
         }
+        let ways = [(DVec3::ZERO, patch.points[i]), (edge, patch.points[j]), (0.5 * edge, rounded(0.5 * edge))];
+        let priced = ways.map(|(x, point)| (cost(x), point));
+        let best = priced[1..].iter().fold(priced[0], |best, other| if other.0.1 < best.0.1 { *other } else { best });
         Some((best.0.0, best.0.1, best.1))
     }
 
-    /// Costs of the edges that are still to be looked at, stale ones among them.
-    pub(super) fn costs(&self) -> impl Iterator<Item = f32> + '_ {
-        self.heap.entries().iter().map(|entry| entry.cost)
+    /// How many edges of about the same cost are still to be looked at, stale entries among them, by buckets of the queue.
+    pub(super) fn counts(&self) -> impl Iterator<Item = usize> + '_ {
+        self.queue.counts()
     }
 
-    /// Collapses edges that cost up to `most`, until no more than `count` triangles are left.
-    pub(super) fn advance(&mut self, most: f32, count: usize) {
+    /// Collapses edges up to the bucket `most`, until no more than `count` triangles are left. Returns at how many it looked.
+    pub(super) fn advance(&mut self, most: usize, count: usize) -> usize {
         let mut stars = std::mem::take(&mut self.stars);
-        while self.patch.live > count && self.heap.cheapest().is_some_and(|entry| entry.cost <= most) {
-            let Some(Entry { ends, version, .. }) = self.heap.pop() else { break };
-            let now = ends.iter().fold(0_u32, |sum, v| sum.wrapping_add(self.patch.versions[*v as usize]));
-            if now == version && ends.iter().all(|v| self.patch.is_there(*v)) {
+        let mut looked_at = 0;
+        while self.patch.live > count {
+            let next = self.queue.cheapest().filter(|bucket| *bucket <= most).and_then(|bucket| self.queue.pop(bucket));
+            let Some(entry) = next else { break };
+            looked_at += 1;
+            let ends = entry.ends;
+            if self.version(ends) == entry.version && ends.iter().all(|v| self.patch.is_there(*v)) {
                 self.collapse(ends, &mut stars);
             }
         }
         self.stars = stars;
+        looked_at
     }
 
     /// Collapses an edge if it may be.
-    fn collapse(&mut self, ends: [u32; 2], [of_u, of_v, spare]: &mut [Star; 3]) {
+    fn collapse(&mut self, ends: [u32; 2], [of_u, of_v]: &mut [Star; 2]) {
         let Some((_, _, to)) = self.price(ends) else { return };
         let [mut u, mut v] = ends;
         if self.patch.kinds[u as usize] > self.patch.kinds[v as usize] || to == self.patch.points[u as usize] {
@@ -177,7 +175,10 @@ impl Work {
             && legal::keeps_shape(&self.patch, [u, v], of_u, &to, shape.turn)
             && (stays || legal::keeps_shape(&self.patch, [v, u], of_v, &to, shape.turn))
             && legal::keeps_features(&self.patch, [u, v], of_u, shape.feature)
-            && of_u.iter().filter(|(_, ring)| ring.contains(&v)).all(|(_, ring)| ring.iter().all(|w| self.patch.star(*w, spare)))
+            && of_u
+                .iter()
+                .filter(|(_, ring)| ring.contains(&v))
+                .all(|(_, ring)| ring.iter().all(|w| self.patch.count(*w) <= MOST))
             && self.guard.as_mut().is_none_or(|guard| guard.allows(&self.patch, [u, v], &to, of_u, of_v));
         if !is_legal {
             return;
@@ -186,18 +187,15 @@ impl Work {
         let at = |w: u32| patch.quadrics[w as usize].wide().around(place(to) - place(patch.points[w as usize]));
         patch.quadrics[v as usize] = at(u).plus(&at(v)).narrow();
         patch.points[v as usize] = to;
-        patch.merge([u, v], of_u, of_v, spare);
+        patch.merge([u, v], of_u, of_v);
         if let Some(guard) = &mut self.guard {
-            guard.grow(patch, spare);
+            of_u.without(v).chain(of_v.without(u)).for_each(|(corner, _)| guard.grow(patch, corner));
         }
         self.marks.clear();
-        for (_, ring) in spare.iter() {
+        for (_, ring) in of_u.without(v).chain(of_v.without(u)) {
             for w in ring {
                 if self.marks.mark(w) {
-                    let entry = self.entry([v, w]);
-                    if let Some(entry) = entry {
-                        self.heap.push(entry);
-                    }
+                    self.enter([v, w]);
                 }
             }
         }

@@ -134,15 +134,13 @@ impl Guard {
         found
     }
 
-    /// Faces around a vertex have become larger.
-    pub(super) fn grow(&mut self, patch: &Patch, star: &Star) {
-        for (corner, _) in star.iter() {
-            let bounds = Bounds::of(&patch.triangle(patch.face(corner as usize / 3)));
-            let mut at = self.leaf_of[corner as usize / 3];
-            while let Some(node) = self.nodes.get_mut(at as usize).filter(|node| !node.bounds.contains(&bounds)) {
-                node.bounds.add(&bounds);
-                at = node.above;
-            }
+    /// The face of a corner has become larger.
+    pub(super) fn grow(&mut self, patch: &Patch, corner: u32) {
+        let bounds = Bounds::of(&patch.triangle(patch.face(corner as usize / 3)));
+        let mut at = self.leaf_of[corner as usize / 3];
+        while let Some(node) = self.nodes.get_mut(at as usize).filter(|node| !node.bounds.contains(&bounds)) {
+            node.bounds.add(&bounds);
+            at = node.above;
         }
     }
 }

@@ -39,6 +39,12 @@ impl Star {
     pub(super) fn iter(&self) -> impl Iterator<Item = (u32, [u32; 2])> + '_ {
         self.corners.iter().copied().zip(self.ring.iter().copied()).take(self.len)
     }
+
+    /// Those without a vertex.
+    #[inline]
+    pub(super) fn without(&self, gone: u32) -> impl Iterator<Item = (u32, [u32; 2])> + '_ {
+        self.iter().filter(move |(_, ring)| !ring.contains(&gone))
+    }
 }
 
 /// Triangles by their corners, with what is known of each vertex.
@@ -57,6 +63,8 @@ pub(super) struct Patch {
     pub(super) became: Vec<u32>,
     next: Vec<u32>,
     first: Vec<u32>,
+    /// How many triangles each vertex has.
+    counts: Vec<u32>,
     /// Triangles that are there.
     pub(super) live: usize,
 }
@@ -76,7 +84,9 @@ impl Patch {
         let count = points.len();
         let mut next = vec![NONE; corners.len()];
         let mut first = vec![NONE; count];
+        let mut counts = vec![0; count];
         for (corner, v) in corners.iter().enumerate() {
+            counts[*v as usize] += 1;
             let at = &mut first[*v as usize];
             if *at == NONE {
                 (*at, next[corner]) = (corner as u32, corner as u32);
@@ -95,6 +105,7 @@ impl Patch {
             became: (0..count as u32).collect(),
             next,
             first,
+            counts,
             live,
         }
     }
@@ -146,9 +157,8 @@ impl Patch {
         self.first[v as usize] = first;
     }
 
-    /// Lets `u` become `v`, whose stars these are; the two triangles of both are gone. `spare` is overwritten by the star of `v`.
-    pub(super) fn merge(&mut self, [u, v]: [u32; 2], of_u: &Star, of_v: &Star, spare: &mut Star) {
-        let stays = |(corner, ring): (u32, [u32; 2]), gone: u32| (!ring.contains(&gone)).then_some(corner);
+    /// Lets `u` become `v`, whose stars these are; the two triangles of both are gone.
+    pub(super) fn merge(&mut self, [u, v]: [u32; 2], of_u: &Star, of_v: &Star) {
         for (corner, ring) in of_u.iter().filter(|(_, ring)| ring.contains(&v)) {
             let wing = if ring[0] == v { ring[1] } else { ring[0] };
             for c in others(corner) {
@@ -156,20 +166,21 @@ impl Patch {
             }
             self.corners[corner as usize] = NONE;
             self.unlink(wing);
+            self.counts[wing as usize] -= 1;
             self.live -= 1;
         }
-        for (corner, _) in of_u.iter().filter(|(_, ring)| !ring.contains(&v)) {
+        for (corner, _) in of_u.without(v) {
             self.corners[corner as usize] = v;
         }
-        let corners = of_u.iter().filter_map(|one| stays(one, v)).chain(of_v.iter().filter_map(|one| stays(one, u)));
-        self.link(v, corners);
+        self.link(v, of_u.without(v).chain(of_v.without(u)).map(|(corner, _)| corner));
         self.first[u as usize] = NONE;
+        let gone = of_u.iter().filter(|(_, ring)| ring.contains(&v)).count();
+        self.counts[v as usize] = (of_u.len + of_v.len - 2 * gone) as u32;
         self.became[u as usize] = v;
         self.strict[v as usize] = self.strict[v as usize].max(self.strict[u as usize]);
         for w in [u, v] {
             self.versions[w as usize] = self.versions[w as usize].wrapping_add(1);
         }
-        self.star(v, spare);
     }
 
     /// Lets go of the corners at a vertex that belong to triangles that are gone.
@@ -196,6 +207,12 @@ impl Patch {
             self.next[kept_last as usize] = kept_first;
         }
         self.first[v as usize] = kept_first;
+    }
+
+    /// How many triangles a vertex has.
+    #[inline]
+    pub(super) fn count(&self, v: u32) -> usize {
+        self.counts[v as usize] as usize
     }
 
     /// Is it there?

@@ -8,16 +8,17 @@ use crate::simplify::cell::{Obstacle, Rules, Work};
 use crate::simplify::net::Net;
 use crate::simplify::partition::{Parting, Partition};
 use crate::simplify::patch::{FIXED, Patch};
+use crate::simplify::queue::BUCKETS;
 use crate::util::ids::NONE;
-
-/// Each so many entries of a cell's heap stands for all of them.
-const SAMPLE: usize = 16;
 
 /// The share of collapses still wanted that a step looks for, so that none goes too far.
 const STEP: f64 = 0.7;
 
 /// Steps of a round, at most; each does about a half of what is left.
 const STEPS: usize = 24;
+
+/// A step looks at so many times as many edges as are to collapse, at most.
+const LEAST_YIELD: f64 = 0.02;
 
 /// The mesh in cells.
 struct Parted {
@@ -149,7 +150,7 @@ pub(super) fn round(net: &mut Net, rules: Rules, parting: Parting, goal: Goal) -
             if is_crossed {
                 let live = work.patch.live;
                 *work = parted.work(net, c, rules, true);
-                work.advance(f32::INFINITY, live);
+                work.advance(BUCKETS, live);
             }
             is_crossed
         })
@@ -176,31 +177,47 @@ fn wanted(net: &Net, parted: &Parted, goal: Goal) -> usize {
 /// Advances all cells, at about the same cost, until so many triangles are left in them.
 fn advance(works: &mut [Work], wanted: usize) {
     if let [work] = works {
-        return work.advance(f32::INFINITY, wanted);
+        work.advance(BUCKETS, wanted);
+        return;
     }
+    // The share of the edges looked at that collapse: the others are stale, or may not.
+    let mut yields = 1.0;
     for step in 0..STEPS {
         let live: usize = works.iter().map(|work| work.patch.live).sum();
         let Some(excess) = live.checked_sub(wanted).filter(|excess| *excess > 0) else { return };
-        let samples: Vec<Vec<f32>> = works.par_iter().map(|work| work.costs().step_by(SAMPLE).collect()).collect();
-        let mut all: Vec<f32> = samples.iter().flatten().copied().collect();
         let is_last = step + 1 == STEPS || excess < 4 * works.len();
-        let rank = (excess as f64 / 2.0 * STEP / SAMPLE as f64) as usize;
-        let most = if wanted == 0 || is_last || rank >= all.len() {
-            f32::INFINITY
-        } else {
-            *all.select_nth_unstable_by(rank, f32::total_cmp).1
-        };
-        let shares: Vec<usize> = samples.iter().map(|own| own.iter().filter(|cost| **cost <= most).count()).collect();
+        let rank = (excess as f64 / 2.0 * STEP / yields) as usize;
+        let most = if wanted == 0 || is_last { BUCKETS } else { bucket_at(works, rank) };
+        let shares: Vec<usize> = works.iter().map(|work| work.counts().take(most + 1).sum()).collect();
         let collapses = in_parts(excess.div_ceil(2), &shares);
-        works.par_iter_mut().with_max_len(1).zip(collapses).for_each(|(work, collapses)| {
-            let least = if wanted == 0 { 0 } else { work.patch.live.saturating_sub(2 * collapses) };
-            work.advance(most, least);
-        });
+        let looked_at: Vec<usize> = works
+            .par_iter_mut()
+            .with_max_len(1)
+            .zip(collapses)
+            .map(|(work, collapses)| {
+                let least = if wanted == 0 { 0 } else { work.patch.live.saturating_sub(2 * collapses) };
+                work.advance(most, least)
+            })
+            .collect();
         let left: usize = works.iter().map(|work| work.patch.live).sum();
-        if is_last || wanted == 0 || (left == live && most == f32::INFINITY) {
+        if is_last || wanted == 0 || (left == live && most == BUCKETS) {
             return;
         }
+        let looked_at: usize = looked_at.into_iter().sum();
+        yields = ((live - left) as f64 / 2.0 / looked_at.max(1) as f64).clamp(LEAST_YIELD, 1.0);
     }
+}
+
+/// The bucket of the edge of this rank in all cells, beyond all of them if there are no more.
+fn bucket_at(works: &[Work], rank: usize) -> usize {
+    let mut counts = vec![0; BUCKETS];
+    works.iter().for_each(|work| counts.iter_mut().zip(work.counts()).for_each(|(sum, count)| *sum += count));
+    let mut before = 0;
+    let holds = |count: &usize| {
+        before += count;
+        before > rank
+    };
+    counts.iter().position(holds).unwrap_or(BUCKETS)
 }
 
 /// A number in parts of such shares; their sum is the number, if there is any share.

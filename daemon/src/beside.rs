@@ -96,7 +96,7 @@ fn copy(from: &Path, to: &Path, (now, settle): (Time, Duration)) -> io::Result<b
     }
     fsx::remove_if_there(to)?;
     let mut target = File::options().write(true).create_new(true).open(to)?;
-    io::copy(&mut &*original.file(), &mut target)?;
+    io::copy(&mut original.file(), &mut target)?;
     let is_same = Identity::of(from).is_ok_and(|after| after == before);
     if !is_same {
         fsx::remove_if_there(to)?;

@@ -40,6 +40,9 @@ pub(super) struct Layout {
     pub(super) is_mirrored: bool,
 }
 
+/// The number of a ring, and of a point in it.
+type Place = (usize, usize);
+
 impl Layout {
     /// Divides edges of cuts, which are in rings once in each direction; whether any was. Both sides of a cut get the same point.
     /// O(places · log places + wishes²), where wishes are few.
@@ -57,14 +60,14 @@ impl Layout {
             let from = known.partition_point(|(other, ..)| *other < ends);
             known.get(from).filter(|(other, ..)| *other == ends).map(|(_, ring, at)| (*ring, *at))
         };
-        let mut new: Vec<((usize, usize), (Corner, [f64; 2]))> = Vec::new();
+        let mut new: Vec<(Place, (Corner, [f64; 2]))> = Vec::new();
         for (ends, share) in wishes {
             let [a, b] = *ends;
             let (Some(there), Some(back)) = (find([a, b]), find([b, a])) else { continue };
             if new.iter().any(|(at, _)| *at == there) {
                 continue;
             }
-            let between = |(ring, at): (usize, usize), share: f64| {
+            let between = |(ring, at): Place, share: f64| {
                 let ring = self.rings.get(ring)?;
                 let ((_, p), (_, q)) = (ring.get(at)?, ring.get((at + 1) % ring.len())?);
                 Some([p[0] + share * (q[0] - p[0]), p[1] + share * (q[1] - p[1])])

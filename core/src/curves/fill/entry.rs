@@ -1,6 +1,6 @@
 //! Outlines filled: the way in.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use rayon::prelude::*;
 
@@ -119,7 +119,8 @@ fn made(shapes: &[&Shape], outlines: &[Outline], beside: &[Beside<'_>], options:
 }
 
 /// Patches of outlines, whose curves are divided until triangles are even or for so many rounds. If some outlines were better before, all is done
-/// again, and these wish nothing after the round in which they were best: it only makes those beside them finer.
+/// again, and these wish nothing after the round in which they were best: it only makes those beside them finer. Where an outline lost its surface by that,
+/// nothing that shares its curves wishes anything.
 fn evened<'a>(
     known: (&'a Strands<'a>, &'a [Tried]),
     outlines: &'a [Outline],
@@ -132,25 +133,43 @@ fn evened<'a>(
     }
     let before = divided.clone();
     let mut limits = vec![ROUNDS; outlines.len()];
-    for _ in 0..AGAIN {
+    for time in 0..=AGAIN {
         let (first, best) = rounds((known, outlines, options), divided, &mut patches, &limits);
         let mut is_any = false;
         for ((patch, (fewest, at)), limit) in patches.iter().zip(best).zip(&mut limits) {
             // One that has never become better is best before all rounds.
-            if at < *limit && (patch.report.poor > fewest || (at == 0 && fewest > 0)) {
+            if at < *limit && (patch.flaws() > fewest || (at == 0 && fewest > 0)) {
                 (*limit, is_any) = (at, true);
             }
         }
-        if !is_any {
-            return patches;
+        let is_lost = |number: &usize| {
+            first.get(number).is_some_and(|old| patches[*number].flaws() > old.flaws() && !patches[*number].is_filled())
+        };
+        let lost: Vec<usize> = (0..outlines.len()).filter(is_lost).collect();
+        for number in sharing(outlines, &lost) {
+            (limits[number], is_any) = (0, true);
+        }
+        if !is_any || (time == AGAIN && lost.is_empty()) {
+            break;
         }
         divided.clone_from(&before);
         for (number, patch) in first {
             patches.iter_mut().skip(number).take(1).for_each(|old| old.clone_from(&patch));
         }
     }
-    rounds((known, outlines, options), divided, &mut patches, &limits);
     patches
+}
+
+/// The outlines that have a curve of one of these. O(uses).
+fn sharing(outlines: &[Outline], numbers: &[usize]) -> Vec<usize> {
+    if numbers.is_empty() {
+        return Vec::new();
+    }
+    let curves = |outline: &'_ Outline| -> Vec<usize> {
+        std::iter::once(&outline.outer).chain(&outline.inner).flatten().map(|one| one.curve).collect()
+    };
+    let known: BTreeSet<usize> = numbers.iter().filter_map(|number| outlines.get(*number)).flat_map(curves).collect();
+    (0..outlines.len()).filter(|number| curves(&outlines[*number]).iter().any(|curve| known.contains(curve))).collect()
 }
 
 /// The first patches of outlines that have changed, and the fewest poor triangles of each outline with the round of that.
@@ -164,12 +183,12 @@ fn rounds<'a>(
     limits: &[u32],
 ) -> Rounds {
     let mut first: BTreeMap<usize, Patch> = BTreeMap::new();
-    let mut best: Vec<(usize, u32)> = patches.iter().map(|patch| (patch.report.poor, 0)).collect();
+    let mut best: Vec<(usize, u32)> = patches.iter().map(|patch| (patch.flaws(), 0)).collect();
     for round in 0..=ROUNDS {
         let mut splits: Vec<Split> = Vec::new();
         for ((patch, (fewest, at)), limit) in patches.iter().zip(&mut best).zip(limits) {
-            if patch.report.poor < *fewest {
-                (*fewest, *at) = (patch.report.poor, round);
+            if patch.flaws() < *fewest {
+                (*fewest, *at) = (patch.flaws(), round);
             }
             splits.extend(patch.splits.iter().filter(|_| round < (*limit).min(*at + PATIENCE)));
         }

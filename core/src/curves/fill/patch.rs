@@ -59,6 +59,18 @@ pub(super) struct Patch {
     pub(super) splits: Vec<Split>,
 }
 
+impl Patch {
+    /// Triangles that are to become better; no surface at all is worse than any number of them.
+    pub(super) fn flaws(&self) -> usize {
+        if self.is_filled() { self.report.poor } else { usize::MAX }
+    }
+
+    /// Whether it has a surface.
+    pub(super) fn is_filled(&self) -> bool {
+        !matches!(self.surface, Surface::Fallback(_))
+    }
+}
+
 /// Points within, triangles, and the longest edge that the surface allows.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Meshed {

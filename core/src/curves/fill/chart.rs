@@ -210,7 +210,7 @@ impl Chart {
         match self {
             Self::Plane(_) | Self::Heights(..) | Self::Disc(..) | Self::Fan(..) => f64::INFINITY,
             Self::Sphere(_, radius) | Self::Turned(Turned::Cylinder(_, radius)) => bent(*radius),
-            // Its radius changes; its edges along the rim are what they are.
+            // Its radius changes: where its outline is decides.
             Self::Turned(Turned::Cone(..)) => f64::INFINITY,
             Self::Turned(Turned::Torus(_, major, minor)) => bent(minor.min(major - minor).max(0.1 * minor)),
             Self::Coons(coons, form) => sagging(coons, *form, chord),

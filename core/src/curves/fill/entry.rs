@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use rayon::prelude::*;
 
 use super::chords::{self, Chord};
-use super::layout::Corner;
+use super::layout::{Corner, Rim};
 use super::mesh::Mesh;
 use super::network::{self, Divided, Strands};
 use super::options::{Continuity, Options, Outline};
@@ -24,6 +24,9 @@ const COARSER: f64 = 1.3;
 
 /// Rounds in which curves are divided for the sake of triangles, at most.
 const ROUNDS: u32 = 24;
+
+/// Points of its rings that an outline may be meshed with in all rounds: so many, or so many times those that it has at first.
+const MOST_WORK: (usize, usize) = (40_000, 3);
 
 /// Times that all rounds are done again, at most.
 const AGAIN: u32 = 3;
@@ -132,9 +135,11 @@ fn evened<'a>(
         return patches;
     }
     let before = divided.clone();
+    let points = |rings: &[Vec<Rim>]| rings.iter().map(Vec::len).sum::<usize>();
+    let mut work: Vec<usize> = divided.rings.iter().map(|rings| MOST_WORK.0.max(MOST_WORK.1 * points(rings))).collect();
     let mut limits = vec![ROUNDS; outlines.len()];
     for time in 0..=AGAIN {
-        let (first, best) = rounds((known, outlines, options), divided, &mut patches, &limits);
+        let (first, best) = rounds((known, outlines, options), divided, &mut patches, (&limits, &mut work));
         let mut is_any = false;
         for ((patch, (fewest, at)), limit) in patches.iter().zip(best).zip(&mut limits) {
             // One that has never become better is best before all rounds.
@@ -180,21 +185,25 @@ fn rounds<'a>(
     (known, outlines, options): ((&'a Strands<'a>, &'a [Tried]), &'a [Outline], &'a Options),
     divided: &mut Divided,
     patches: &mut [Patch],
-    limits: &[u32],
+    (limits, work): (&[u32], &mut [usize]),
 ) -> Rounds {
     let mut first: BTreeMap<usize, Patch> = BTreeMap::new();
     let mut best: Vec<(usize, u32)> = patches.iter().map(|patch| (patch.flaws(), 0)).collect();
     for round in 0..=ROUNDS {
         let mut splits: Vec<Split> = Vec::new();
-        for ((patch, (fewest, at)), limit) in patches.iter().zip(&mut best).zip(limits) {
+        for (((patch, (fewest, at)), limit), work) in patches.iter().zip(&mut best).zip(limits).zip(&*work) {
             if patch.flaws() < *fewest {
                 (*fewest, *at) = (patch.flaws(), round);
             }
-            splits.extend(patch.splits.iter().filter(|_| round < (*limit).min(*at + PATIENCE)));
+            splits.extend(patch.splits.iter().filter(|_| *work > 0 && round < (*limit).min(*at + PATIENCE)));
         }
         let touched = divided.split(known.0, outlines, splits);
         if touched.is_empty() {
             break;
+        }
+        for number in &touched {
+            let points = divided.rings.get(*number).map_or(0, |rings| rings.iter().map(Vec::len).sum());
+            work.iter_mut().skip(*number).take(1).for_each(|left| *left = left.saturating_sub(points));
         }
         let tasks = tasks(known, (outlines, &[]), options, divided, false);
         let again: Vec<(usize, Patch)> =

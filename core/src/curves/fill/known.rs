@@ -192,3 +192,36 @@ fn one_side_and_two_are_filled_within_their_curves() {
         assert!(distance(middle, [0.0; 3]) < 0.1 * size);
     }
 }
+
+/// A whole cone of two halves with its apex, and a frustum: chords across are as near to the surface as is asked for, three times that around the apex, where all is narrow.
+#[test]
+fn cones_are_as_near_as_is_asked_for() {
+    let chord = 0.02;
+    for top in [0.0, 0.3] {
+        let half = |side: f64| {
+            let turn = |wide: f64, high: f64, angles: [f64; 2]| {
+                Shape::Arc(Arc::new([0.0, 0.0, high], [[wide, 0.0, 0.0], [0.0, side * wide, 0.0]], angles).unwrap())
+            };
+            let high = 2.0 * (1.0 - top);
+            let (down, up) =
+                (Shape::Line([[-1.0, 0.0, 0.0], [-top, 0.0, high]]), Shape::Line([[top, 0.0, high], [1.0, 0.0, 0.0]]));
+            let half = [0.0, 0.5 * TAU];
+            if top == 0.0 {
+                vec![turn(1.0, 0.0, half), down, up]
+            } else {
+                vec![turn(1.0, 0.0, half), down, turn(top, high, [half[1], 0.0]), up]
+            }
+        };
+        for side in [1.0, -1.0] {
+            let result = run(&half(side), &Options { chord: Some(chord), ..Options::default() });
+            assert!(matches!(result.surfaces[0], Surface::Carrier(Carrier::Cone { .. })), "{:?}", result.reports[0]);
+            let at = |number: u32| result.mesh.points[number as usize];
+            let middles = result.mesh.triangles.iter().flat_map(|&[a, b, c]| {
+                let [p, q, r] = [a, b, c].map(at);
+                [scale(add(p, q), 0.5), scale(add(q, r), 0.5), scale(add(r, p), 0.5)]
+            });
+            let off = middles.map(|p| (p[0].hypot(p[1]) - (1.0 - 0.5 * p[2])).abs()).fold(0.0, f64::max);
+            assert!(off <= if top == 0.0 { 3.5 } else { 1.3 } * chord, "{top} {side}: {off}");
+        }
+    }
+}

@@ -44,6 +44,14 @@ pub(super) struct Layout {
 type Place = (usize, usize);
 
 impl Layout {
+    /// The longest edge whose middle is no farther than a distance from the surface, and along which that turns no more than an angle. A cone's radius changes:
+    /// its narrowest place within the outline decides, but where that is the apex: edges across it are off by three times the distance at most. O(places).
+    pub(super) fn longest(&self, chord: f64, angle: f64) -> f64 {
+        let Chart::Turned(Turned::Cone(_, half)) = self.chart else { return self.chart.longest(chord, angle) };
+        let far = self.rings.iter().flatten().map(|(_, [x, y])| x.hypot(*y)).fold(f64::INFINITY, f64::min);
+        (8.0 * chord * (far * half.tan()).max(4.0 * chord)).sqrt()
+    }
+
     /// Divides edges of cuts, which are in rings once in each direction; whether any was. Both sides of a cut get the same point.
     /// O(places · log places + wishes²), where wishes are few.
     pub(super) fn divide(&mut self, wishes: &[Wish]) -> bool {

@@ -315,7 +315,7 @@ impl<'a> Task<'a> {
 
     /// The longest edge that a surface allows.
     pub(super) fn allowed(&self, layout: &Layout) -> f64 {
-        layout.chart.longest(self.chord, self.options.angle)
+        layout.longest(self.chord, self.options.angle)
     }
 
     /// Points within, at most: long outlines need them in proportion.

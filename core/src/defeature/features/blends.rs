@@ -19,6 +19,8 @@ use super::strip::Strip;
 const COS_TOUCH: f64 = 0.9975;
 /// Cosines of 15° and 75°: between them chamfers meet their faces.
 const CHAMFER: [f64; 2] = [0.259, 0.966];
+/// Cosine of the largest turn of a chamfer, 110°: a narrow flat between steeper faces is the tip of a tooth, or the floor of a groove.
+const COS_BEVEL: f64 = -0.342;
 /// Cosine of the largest turn of a strip, 150°: beyond, its faces hardly meet.
 const COS_TURN: f64 = -0.866;
 /// The least area of a fillet's support beside its own: a shaft's end that is rounded over most of its radius leaves little.
@@ -171,7 +173,12 @@ fn bevels(mesh: &Mesh, segments: &Segments, number: u32, sides: &[Vec<u32>; 2], 
     let large = |k: usize| segments.list[supports[k] as usize].area > 1.2 * segment.area;
     let length = |k: usize| -> f64 { sides[k].iter().map(|h| distance(mesh.at(mesh.from(*h)), mesh.at(mesh.to(*h)))).sum() };
     let long = width(mesh, sides).is_some_and(|width| length(0).min(length(1)) > 1.5 * width);
-    convex(0) == convex(1) && blunt(0) && blunt(1) && large(0) && large(1) && long
+    let outward = |k: usize| {
+        let half = sides[k][sides[k].len() / 2];
+        segments.list[supports[k] as usize].outward(mesh.at(mesh.from(half)))
+    };
+    let is_edge = dot(outward(0), outward(1)) > COS_BEVEL;
+    is_edge && convex(0) == convex(1) && blunt(0) && blunt(1) && large(0) && large(1) && long
 }
 
 /// The distance of the two rims: the least from the middle of the shorter one to a vertex or edge of the other.

@@ -114,6 +114,18 @@ fn triangles_of_a_fillet_may_run_askew() {
     check(&parts::lofted(&outline(1.0), &outline(1.15), 30.0), Kind::Fillet, 2.0, 6000.0);
 }
 
+/// The tip of a tooth between steep flanks, and the narrow floor of a V, are no bevelled edges: where their faces meet is far away.
+#[test]
+fn narrow_flats_between_steep_faces_are_no_chamfers() {
+    let limits = Limits { fillets_below: Some(3.0), ..Limits::default() };
+    let tooth = [[0.0, 0.0], [20.0, 0.0], [20.0, 5.0], [12.0, 5.0], [10.5, 9.0], [9.5, 9.0], [8.0, 5.0], [0.0, 5.0]];
+    let floor = [[0.0, 0.0], [20.0, 0.0], [20.0, 10.0], [12.0, 10.0], [10.5, 6.0], [9.5, 6.0], [8.0, 10.0], [0.0, 10.0]];
+    for outline in [tooth, floor] {
+        let part = parts::bar(&outline, 30.0);
+        assert_eq!(defeature(&part.points, &part.triangles, &limits).unwrap(), Removed::default());
+    }
+}
+
 #[test]
 fn the_rounded_end_of_a_shaft_is_a_fillet() {
     // Narrow strips of the torus are cylinders within the tolerance, its last row is a cone; of the wider one, little of the

@@ -202,15 +202,15 @@ fn cones_are_as_near_as_is_asked_for() {
             let turn = |wide: f64, high: f64, angles: [f64; 2]| {
                 Shape::Arc(Arc::new([0.0, 0.0, high], [[wide, 0.0, 0.0], [0.0, side * wide, 0.0]], angles).unwrap())
             };
+            // The way back is the same arc, mirrored.
+            let back = |wide: f64, high: f64| {
+                Shape::Arc(Arc::new([0.0, 0.0, high], [[wide, 0.0, 0.0], [0.0, -side * wide, 0.0]], [-0.5 * TAU, 0.0]).unwrap())
+            };
             let high = 2.0 * (1.0 - top);
             let (down, up) =
                 (Shape::Line([[-1.0, 0.0, 0.0], [-top, 0.0, high]]), Shape::Line([[top, 0.0, high], [1.0, 0.0, 0.0]]));
             let half = [0.0, 0.5 * TAU];
-            if top == 0.0 {
-                vec![turn(1.0, 0.0, half), down, up]
-            } else {
-                vec![turn(1.0, 0.0, half), down, turn(top, high, [half[1], 0.0]), up]
-            }
+            if top == 0.0 { vec![turn(1.0, 0.0, half), down, up] } else { vec![turn(1.0, 0.0, half), down, back(top, high), up] }
         };
         for side in [1.0, -1.0] {
             let result = run(&half(side), &Options { chord: Some(chord), ..Options::default() });

@@ -43,6 +43,13 @@ mod recover;
 mod results;
 mod submit;
 
+#[cfg(feature = "postgres")]
+pub(crate) use notices::can_be_subscribers;
+#[cfg(feature = "postgres")]
+pub(crate) use past::{HIGHEST, can_be_recorded};
+#[cfg(feature = "postgres")]
+pub(crate) use submit::{CHUNK, can_be_taken, found_now};
+
 use files::{Files, Identity};
 use line::{Line, Now};
 use results::Results;
@@ -446,7 +453,8 @@ fn unfilled_put() -> Result<Put, StoreError> {
     Ok(Put { table: Table::Meta, key: UNFILLED.to_vec(), value: Some(record::encode(Table::Meta, UNFILLED, &true)?) })
 }
 
-fn fits(what: &str, name: &str) -> Result<(), StoreError> {
+/// Does a name fit a record?
+pub(crate) fn fits(what: &str, name: &str) -> Result<(), StoreError> {
     let length = serde_json::to_string(name).map_or(usize::MAX, |text| text.len());
     if length > MAX_NAME { Err(StoreError::TooLong { what: format!("{what} {name:?}") }) } else { Ok(()) }
 }

@@ -16,10 +16,10 @@
 //! were taken in by the first try. Nothing that was acknowledged is lost, as far as the database keeps its word; one that runs without `fsync` is
 //! refused.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::sync::atomic::{AtomicI64, AtomicU32, Ordering};
 use std::sync::mpsc::Sender;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use sqlx::postgres::PgConnection;
@@ -27,16 +27,20 @@ use tokio::runtime::Runtime;
 
 #[cfg(any(test, feature = "testkit"))]
 use crate::id::Clock;
-use crate::id::{JobId, Recipe, Seq, Time, Token};
+use crate::id::{JobId, Recipe, Seq, Time};
 use crate::job::{Event, Illegal, Job, Kind, Past, Source, Step, Testimony, one_line};
 use crate::news::{News, Notice};
-use crate::queue::{CHUNK, can_be_recorded, can_be_subscribers, can_be_taken, fits};
+use crate::queue::fits;
+use crate::queue::notices::can_be_subscribers;
+use crate::queue::past::can_be_recorded;
+use crate::queue::submit::{CHUNK, can_be_taken};
 use crate::store::{
     Claim, Control, Filter, JobStore, Lease, Look, Page, Query, Recovered, StoreError, Submission, Submitted, Waiting,
 };
 
 mod claim;
 mod database;
+mod leases;
 mod look;
 mod marks;
 mod migrate;
@@ -52,6 +56,7 @@ mod tests;
 
 use claim::Life;
 use database::{Again, Database, Failure, wait};
+use leases::Claims;
 pub use open::{Shared, role};
 use step::By;
 
@@ -70,31 +75,6 @@ pub struct PostgresStore {
     looked: Mutex<Option<Instant>>,
 }
 
-/// The claims that this life has given out, whose leases it keeps.
-#[derive(Default)]
-struct Claims(Mutex<BTreeMap<JobId, Token>>);
-
-impl Claims {
-    fn lock(&self) -> MutexGuard<'_, BTreeMap<JobId, Token>> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    fn tokens(&self) -> Vec<Token> {
-        self.lock().values().copied().collect()
-    }
-
-    fn keep(&self, claim: &Claim) {
-        self.lock().insert(claim.id, claim.token);
-    }
-
-    fn end(&self, claim: &Claim) {
-        let mut claims = self.lock();
-        if claims.get(&claim.id) == Some(&claim.token) {
-            claims.remove(&claim.id);
-        }
-    }
-}
-
 impl PostgresStore {
     /// Opens the shared store, or makes it, and begins a new life of the daemon. What its earlier lives left running is found by
     /// [`JobStore::recover`].
@@ -103,7 +83,7 @@ impl PostgresStore {
     /// [`StoreError::Newer`] and [`StoreError::Unusable`] when the schema is another program's, or the database does not keep what it acknowledges;
     /// [`StoreError::Backend`] when it cannot be reached.
     pub fn open(shared: &Shared) -> Result<Self, StoreError> {
-        open::store(shared, None)
+        open::begin(shared, None).map(Self::over)
     }
 
     /// The same under a clock that the caller sets, for tests: no machine's clock is asked.
@@ -112,10 +92,10 @@ impl PostgresStore {
     /// As [`PostgresStore::open`].
     #[cfg(any(test, feature = "testkit"))]
     pub fn open_at(shared: &Shared, clock: Arc<dyn Clock>) -> Result<Self, StoreError> {
-        open::store(shared, Some(clock))
+        open::begin(shared, Some(clock)).map(Self::over)
     }
 
-    fn over(runtime: Arc<Runtime>, end: Sender<Arc<Runtime>>, database: Arc<Database>, life: Life, claims: Arc<Claims>) -> Self {
+    fn over(open::Begun { runtime, end, database, life, claims }: open::Begun) -> Self {
         let (shut, calls, looked) = (Mutex::default(), AtomicI64::new(1), Mutex::default());
         Self { runtime: Some(runtime), end, database, life, claims, shut, calls, looked }
     }
@@ -288,7 +268,7 @@ impl JobStore for PostgresStore {
     }
 
     fn check(&self) -> Result<(), StoreError> {
-        self.ask(async |connection| open::check(connection, &self.life).await)
+        self.ask(async |connection| claim::check(connection, &self.life).await)
     }
 
     fn forget(&self, ids: &[JobId]) -> Result<u64, StoreError> {

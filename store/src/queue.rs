@@ -34,21 +34,14 @@ mod forget;
 mod index;
 mod line;
 mod marks;
-mod notices;
+pub(crate) mod notices;
 mod offered;
 mod outbox;
 mod page;
-mod past;
+pub(crate) mod past;
 mod recover;
 mod results;
-mod submit;
-
-#[cfg(feature = "postgres")]
-pub(crate) use notices::can_be_subscribers;
-#[cfg(feature = "postgres")]
-pub(crate) use past::{HIGHEST, can_be_recorded};
-#[cfg(feature = "postgres")]
-pub(crate) use submit::{CHUNK, can_be_taken, found_now};
+pub(crate) mod submit;
 
 use files::{Files, Identity};
 use line::{Line, Now};

@@ -1,6 +1,7 @@
 //! Claims: one statement each, work outside of any transaction. Their leases are counted by the database's clock; what is left of a daemon that
 //! let them run out is taken back by whoever claims next.
 
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -36,6 +37,23 @@ pub(super) struct Life {
     pub(super) lease: i64,
 }
 
+impl Life {
+    fn over(&self) -> StoreError {
+        StoreError::Unusable {
+            path: PathBuf::from("the shared store"),
+            reason: format!("another daemon has begun under the name {}", self.daemon),
+            advice: "give each daemon a name of its own".into(),
+        }
+    }
+}
+
+/// As [`crate::JobStore::check`].
+pub(super) async fn check(connection: &mut PgConnection, life: &Life) -> Result<(), Failure> {
+    let sql = "SELECT 1 FROM lives WHERE epoch = $1 AND NOT is_over";
+    let row = sqlx::query(sql).bind(int(life.epoch.0)).fetch_optional(connection).await?;
+    row.map(|_| ()).ok_or_else(|| life.over().into())
+}
+
 /// As [`crate::JobStore::claim`]. `call` names it among all of this life, so that a try whose answer was lost is found again.
 pub(super) async fn claim(
     connection: &mut PgConnection,
@@ -62,6 +80,9 @@ pub(super) async fn claim(
             .await?;
         if row.try_get::<Option<i64>, _>("id")?.is_some() {
             return Ok(Some(claim_of(Stored::read(&row)?)?));
+        }
+        if !row.try_get::<bool, _>("is_alive")? {
+            return Err(life.over().into());
         }
         if row.try_get::<i64, _>("candidates")? == 0 {
             return Ok(None);

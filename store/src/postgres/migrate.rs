@@ -49,7 +49,9 @@ pub(super) async fn migrate(connection: &mut PgConnection, schema: &str) -> Resu
 }
 
 async fn is_there(connection: &mut PgConnection, schema: &str) -> Result<bool, Failure> {
-    let there = sqlx::query("SELECT to_regclass($1 || '.migrations') IS NOT NULL AS there").bind(schema);
+    // A look at the catalogue's rows: what names stand for may be remembered from before another made them.
+    let sql = "SELECT EXISTS (SELECT 1 FROM pg_tables WHERE schemaname = $1 AND tablename = 'migrations') AS there";
+    let there = sqlx::query(sql).bind(schema);
     Ok(there.fetch_one(connection).await?.try_get("there")?)
 }
 

@@ -4,18 +4,18 @@ use std::collections::HashMap;
 use std::path::PathBuf;
 use std::str::FromStr;
 use std::sync::Arc;
-use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
+use std::sync::mpsc::{Sender, channel};
 use std::time::Duration;
 
 use sqlx::postgres::{PgConnectOptions, PgConnection};
 use sqlx::{Connection, Row};
 use tokio::runtime::{Builder, Runtime};
 
-use super::claim::{Life, extend};
+use super::claim::Life;
 use super::database::{Again, Database, Failure, wait};
+use super::leases::{Claims, keep_leases};
 use super::migrate::{is_plain, migrate};
-use super::row::{int, number};
-use super::{Claims, PostgresStore};
+use super::row::number;
 use crate::id::{Clock, Epoch, SystemClock};
 use crate::store::StoreError;
 
@@ -71,8 +71,17 @@ pub fn role(schema: &str, role: &str) -> String {
     include_str!("sql/role.sql").replace(":schema", &quoted(schema)).replace(":role", &quoted(role))
 }
 
-/// As [`PostgresStore::open`]; with a clock, that one sets the time of all that is done in the schema.
-pub(super) fn store(shared: &Shared, clock: Option<Arc<dyn Clock>>) -> Result<PostgresStore, StoreError> {
+/// What a store is made of.
+pub(super) struct Begun {
+    pub(super) runtime: Arc<Runtime>,
+    pub(super) end: Sender<Arc<Runtime>>,
+    pub(super) database: Arc<Database>,
+    pub(super) life: Life,
+    pub(super) claims: Arc<Claims>,
+}
+
+/// Begins a life; with a clock, that one sets the time of all that is done in the schema.
+pub(super) fn begin(shared: &Shared, clock: Option<Arc<dyn Clock>>) -> Result<Begun, StoreError> {
     if !is_plain(&shared.schema) {
         return Err(
             shared.unusable("that is no name for a schema", "use small letters, digits and `_`, at most 48, a letter first")
@@ -84,7 +93,7 @@ pub(super) fn store(shared: &Shared, clock: Option<Arc<dyn Clock>>) -> Result<Po
     let runtime = Arc::new(runtime.map_err(failed)?);
     let epoch = wait(&runtime, async || {
         // Half-made is not made: each part sees for itself what is left to do.
-        database.call(Again::Yes, async |connection| begin(connection, shared, clock.is_some()).await).await
+        database.call(Again::Yes, async |connection| begin_life(connection, shared, clock.is_some()).await).await
     })?;
     let lease = i64::try_from(shared.lease.as_millis()).unwrap_or(i64::MAX / 4);
     let life = Life { epoch, daemon: shared.daemon.clone(), machine, lease };
@@ -93,7 +102,7 @@ pub(super) fn store(shared: &Shared, clock: Option<Arc<dyn Clock>>) -> Result<Po
     let keeper = (Arc::clone(&runtime), Arc::clone(&database), life.clone(), Arc::clone(&claims));
     let keep = move || keep_leases(&keeper.0, &keeper.1, &keeper.2, &keeper.3, &ended);
     std::thread::Builder::new().name("job-leases".into()).spawn(keep).map_err(failed)?;
-    Ok(PostgresStore::over(runtime, end, database, life, claims))
+    Ok(Begun { runtime, end, database, life, claims })
 }
 
 fn failed(source: std::io::Error) -> StoreError {
@@ -101,7 +110,7 @@ fn failed(source: std::io::Error) -> StoreError {
 }
 
 /// Brings the schema up to date, and begins a life.
-async fn begin(connection: &mut PgConnection, shared: &Shared, is_test: bool) -> Result<Epoch, Failure> {
+async fn begin_life(connection: &mut PgConnection, shared: &Shared, is_test: bool) -> Result<Epoch, Failure> {
     let settings = "SELECT name, setting FROM pg_settings WHERE name IN ('fsync', 'synchronous_commit')";
     let rows = sqlx::query(settings).fetch_all(&mut *connection).await?;
     let settings: Result<HashMap<String, String>, sqlx::Error> =
@@ -130,34 +139,4 @@ async fn begin(connection: &mut PgConnection, shared: &Shared, is_test: bool) ->
     let epoch: i64 = sqlx::query(new).bind(&shared.daemon).fetch_one(&mut *transaction).await?.try_get("epoch")?;
     transaction.commit().await?;
     Ok(Epoch(number(epoch)))
-}
-
-/// As [`crate::JobStore::check`].
-pub(super) async fn check(connection: &mut PgConnection, life: &Life) -> Result<(), Failure> {
-    let sql = "SELECT 1 FROM lives WHERE epoch = $1 AND NOT is_over";
-    if sqlx::query(sql).bind(int(life.epoch.0)).fetch_optional(connection).await?.is_some() {
-        return Ok(());
-    }
-    Err(StoreError::Unusable {
-        path: PathBuf::from("the shared store"),
-        reason: format!("another daemon has begun under the name {}", life.daemon),
-        advice: "give each daemon a name of its own".into(),
-    }
-    .into())
-}
-
-/// Begins the leases of all claims anew, again and again, until the store ends: as long as the daemon lives, so do its claims.
-fn keep_leases(runtime: &Runtime, database: &Database, life: &Life, claims: &Claims, ended: &Receiver<Arc<Runtime>>) {
-    let pause = Duration::from_millis(life.lease.unsigned_abs() / 4);
-    while let Err(RecvTimeoutError::Timeout) = ended.recv_timeout(pause) {
-        let tokens = claims.tokens();
-        if tokens.is_empty() {
-            continue;
-        }
-        let kept =
-            wait(runtime, async || database.call(Again::Yes, async |connection| extend(connection, life, &tokens).await).await);
-        if let Err(error) = kept {
-            tracing::warn!(%error, "The leases of this daemon's jobs could not be kept; others may take them.");
-        }
-    }
 }

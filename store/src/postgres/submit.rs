@@ -11,7 +11,8 @@ use super::row::{Columns, Stored, identity, int, number};
 use super::step::{By, set};
 use crate::id::{JobId, Time, Token};
 use crate::job::{Event, Job, Kind, Past};
-use crate::queue::{HIGHEST, found_now};
+use crate::queue::past::HIGHEST;
+use crate::queue::submit::found_now;
 use crate::store::{StoreError, Submission, Submitted};
 
 const INSERT: &str = include_str!("sql/insert.sql");

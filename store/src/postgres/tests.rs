@@ -2,10 +2,16 @@
 
 use std::sync::Arc;
 
+use sqlx::{AssertSqlSafe, Connection};
+
 use super::*;
 use crate::id::Clock;
 use crate::testkit::{Subject, conformance};
 
+mod farm;
+mod order;
+mod outage;
+mod schema;
 mod server;
 
 use server::{Server, server};
@@ -35,4 +41,20 @@ fn conforms() {
         let store = Some(PostgresStore::open_at(&shared, Arc::clone(&clock)).unwrap());
         Box::new(OnPostgres { shared, clock, store })
     });
+}
+
+/// Statements by whoever the address names, in the store's schema.
+fn sql(shared: &Shared, statements: &str) -> Result<(), sqlx::Error> {
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();
+    runtime.block_on(async {
+        let mut connection = PgConnection::connect(&shared.url).await?;
+        let statements = format!("SET search_path = {}; {statements}", shared.schema);
+        sqlx::raw_sql(AssertSqlSafe(statements)).execute(&mut connection).await?;
+        connection.close().await
+    })
+}
+
+/// The same store, seen by another daemon.
+fn other(shared: &Shared, daemon: &str) -> Shared {
+    Shared { daemon: daemon.to_owned(), ..shared.clone() }
 }

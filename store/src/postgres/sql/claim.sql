@@ -54,5 +54,6 @@ WITH t AS MATERIALIZED (
     RETURNING j.id, j.seq, j.record, j.epoch, j.token, j.claim_token, j.claim_boot, j.claim_at
 )
 SELECT id, seq, record, epoch, token, claim_token, claim_boot, claim_at,
-    (SELECT count(*) FROM candidates) AS candidates, t.now
+    (SELECT count(*) FROM candidates) AS candidates,
+    EXISTS (SELECT 1 FROM lives WHERE lives.epoch = $1 AND NOT is_over) AS is_alive
 FROM t LEFT JOIN claimed ON true

@@ -57,7 +57,7 @@ impl Failure {
         match error {
             sqlx::Error::Io(_) | sqlx::Error::Protocol(_) | sqlx::Error::Tls(_) => true,
             sqlx::Error::Database(error) => error.code().is_some_and(|code| {
-                let classes = ["08", "40", "53", "57P"];
+                let classes = ["08", "40", "53", "55P03", "57P"];
                 // A standby that has not taken over yet refuses to write.
                 classes.iter().any(|class| code.starts_with(class)) || code == "25006"
             }),

@@ -61,6 +61,12 @@ impl Shared {
             // A daemon that is stopped in the middle of a transaction must not keep others from their rows.
             ("idle_in_transaction_session_timeout", "30s"),
             ("lock_timeout", "30s"),
+            // How many rows there are is not known at first, and changes by the hour; each statement has an index that it can go along.
+            ("enable_seqscan", "off"),
+            ("enable_bitmapscan", "off"),
+            ("enable_sort", "off"),
+            ("plan_cache_mode", "force_generic_plan"),
+            ("jit", "off"),
         ]))
     }
 }

@@ -11,7 +11,7 @@ use super::database::Failure;
 use super::row::{int, number};
 use crate::id::{JobId, Seq};
 
-/// First half of the key of every lock that the store takes in the database; the other is the schema's.
+/// First half of the key of every lock that the store takes in the database, also in `suture_write`; the other is the schema's.
 pub(super) const LOCKS: i32 = 0x5375_7475;
 
 /// For the rest of the transaction, before the number is taken.

@@ -5,8 +5,8 @@
 
 use std::sync::Mutex;
 
+use sqlx::Row;
 use sqlx::postgres::PgConnection;
-use sqlx::{Connection, Row};
 
 use super::database::Failure;
 use super::outbox;
@@ -18,7 +18,7 @@ use crate::store::StoreError;
 
 const READ: &str =
     "SELECT id, seq, record, epoch, token, claim_token, claim_boot, claim_at, suture_now() AS now FROM jobs WHERE id = $1";
-const WRITE: &str = include_str!("sql/write.sql");
+const WRITE: &str = "SELECT suture_write($1, $2, $3, $4, $5, $6, $7, $8, $9, $10, $11, $12, $13, $14, $15, $16, $17) AS seq";
 /// So often others may be quicker before something must be wrong.
 const ROUNDS: usize = 1000;
 
@@ -59,7 +59,7 @@ pub(super) async fn transition(
         let after = after.map_err(|source| StoreError::Illegal { id, source })?;
         let columns = Columns::of(&after)?;
         *tried() = Some(columns.record.clone());
-        if let Some(seq) = write(connection, &stored, &after, &columns, by).await? {
+        if let Some(seq) = set(connection, &stored, &after, &columns, by).await? {
             return Ok(Job { seq, ..after });
         }
         // Nothing was written, so that a record alike is someone else's.
@@ -68,30 +68,7 @@ pub(super) async fn transition(
     Err(StoreError::Poisoned { reason: format!("job {id} changes without an end") }.into())
 }
 
-/// Writes `after` in the place of what was read; `None`: something else is there meanwhile.
-async fn write(
-    connection: &mut PgConnection,
-    before: &Stored,
-    after: &Job,
-    columns: &Columns,
-    by: By,
-) -> Result<Option<Seq>, Failure> {
-    let ends = matches!(after.state, State::Ended { .. }) && before.job.state != after.state;
-    if !ends {
-        return set(connection, before, after, columns, by).await;
-    }
-    let mut transaction = connection.begin().await?;
-    outbox::share(&mut transaction).await?;
-    let Some(seq) = set(&mut transaction, before, after, columns, by).await? else {
-        transaction.rollback().await?;
-        return Ok(None);
-    };
-    outbox::put(&mut transaction, seq, Some(after.id), record::encode_end(&outbox::key(Some(after.id)), after)?).await?;
-    transaction.commit().await?;
-    Ok(Some(seq))
-}
-
-/// The statement alone.
+/// Writes `after` in the place of what was read, and the entry for subscribers where it ends; `None`: something else is there meanwhile.
 pub(super) async fn set(
     connection: &mut PgConnection,
     before: &Stored,
@@ -110,9 +87,12 @@ pub(super) async fn set(
         By::Heir { lease } => (None, Some(lease)),
         By::Operator => (None, None),
     };
+    let ends = matches!(after.state, State::Ended { .. }) && before.job.state != after.state;
+    let ended = ends.then(|| record::encode_end(&outbox::key(Some(after.id)), after)).transpose()?;
     let row = sqlx::query(WRITE)
         .bind(columns.id)
         .bind(int(before.job.seq.0))
+        .bind(needed)
         .bind(&columns.record)
         .bind(columns.kind)
         .bind(columns.kind_claimed)
@@ -126,8 +106,9 @@ pub(super) async fn set(
         .bind(token.map(|token| int(token.0)))
         .bind(lease)
         .bind(columns.is_fresh)
-        .bind(needed)
-        .fetch_optional(connection)
+        .bind(ended)
+        .fetch_one(connection)
         .await?;
-    Ok(row.map(|row| row.try_get("seq")).transpose()?.map(|seq: i64| Seq(number(seq))))
+    let seq: Option<i64> = row.try_get("seq")?;
+    Ok(seq.map(|seq| Seq(number(seq))))
 }

@@ -9,6 +9,7 @@ use crate::id::Clock;
 use crate::testkit::{Subject, conformance};
 
 mod farm;
+mod figures;
 mod order;
 mod outage;
 mod schema;

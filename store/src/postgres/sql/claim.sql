@@ -1,4 +1,5 @@
 -- $1 epoch, $2 boot, $3 call, $4 lease in ms, $5 least size, $6 most size, $7 alone, $8 folders that are shut.
+-- Connections are told to prefer indexes (`open.rs`): in a new database nothing is known of how many rows there are.
 -- Each step of priority takes 1,800,000 ms of waiting; a pause that ends later than 1,800,000 ms from now was set by a clock that jumped.
 WITH t AS MATERIALIZED (
     SELECT suture_now() AS now
@@ -22,18 +23,29 @@ WITH t AS MATERIALIZED (
         ORDER BY id LIMIT 64
     ) r
 ), rested AS MATERIALIZED (
-    SELECT id, kind, priority + least(9 - priority, greatest(0, t.now - since) / 1800000) AS rank, 0::bigint AS turn
-    FROM jobs, t
-    WHERE kind = 'waiting' AND alone = $7 AND size BETWEEN $5 AND $6 AND folder <> ALL ($8)
-        AND not_before IS NOT NULL AND (not_before <= t.now OR not_before > t.now + 1800000)
-    ORDER BY rank DESC, id LIMIT 64
+    SELECT r.id, r.kind, r.priority + least(9 - r.priority, greatest(0, t.now - r.since) / 1800000) AS rank, 0::bigint AS turn
+    FROM t CROSS JOIN LATERAL (
+        SELECT id, kind, priority, since FROM jobs
+        WHERE kind = 'waiting' AND not_before IS NOT NULL AND not_before <= t.now
+            AND alone = $7 AND size BETWEEN $5 AND $6 AND folder <> ALL ($8)
+        UNION ALL
+        SELECT id, kind, priority, since FROM jobs
+        WHERE kind = 'waiting' AND not_before IS NOT NULL AND not_before > t.now + 1800000
+            AND alone = $7 AND size BETWEEN $5 AND $6 AND folder <> ALL ($8)
+    ) r
+    ORDER BY rank DESC, r.id LIMIT 64
 ), parked AS MATERIALIZED (
     -- Before all others, for whoever asks.
-    SELECT id, kind, 10::bigint AS rank, not_before AS turn
-    FROM jobs, t
-    WHERE kind = 'parked' AND folder <> ALL ($8)
-        AND not_before IS NOT NULL AND (not_before <= t.now OR not_before > t.now + 1800000)
-    ORDER BY not_before, id LIMIT 64
+    SELECT r.id, r.kind, 10::bigint AS rank, r.not_before AS turn
+    FROM t CROSS JOIN LATERAL (
+        (SELECT id, kind, not_before FROM jobs
+        WHERE kind = 'parked' AND not_before IS NOT NULL AND not_before <= t.now AND folder <> ALL ($8)
+        ORDER BY not_before, id LIMIT 64)
+        UNION ALL
+        (SELECT id, kind, not_before FROM jobs
+        WHERE kind = 'parked' AND not_before IS NOT NULL AND not_before > t.now + 1800000 AND folder <> ALL ($8)
+        ORDER BY not_before, id LIMIT 64)
+    ) r
 ), candidates AS MATERIALIZED (
     SELECT * FROM ready UNION ALL SELECT * FROM rested UNION ALL SELECT * FROM parked
 ), pick AS MATERIALIZED (

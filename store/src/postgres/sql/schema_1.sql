@@ -90,3 +90,31 @@ CREATE TABLE away (
 -- Since when the database runs: leases that ended while it did not run are given one more lease.
 CREATE FUNCTION suture_up_since() RETURNS bigint LANGUAGE sql STABLE
     AS $$ SELECT (extract(epoch FROM pg_postmaster_start_time()) * 1000)::bigint $$;
+
+-- Compare and set, all in one call; the number of the new transition, or none. `seq_read` is the transition that was read, `needed` the
+-- token that is needed, if one is, `lease` in ms; none: it stays as it is. `ended`: the entry for subscribers of a job that ends by this.
+CREATE FUNCTION suture_write(
+    job_id bigint, seq_read bigint, needed bigint, new_record bytea, new_kind text, new_kind_claimed text, new_priority smallint,
+    new_since bigint, new_not_before bigint, new_alone boolean, new_cancel boolean, new_recipe bigint, new_epoch bigint,
+    new_token bigint, lease bigint, is_fresh boolean, ended bytea
+) RETURNS bigint LANGUAGE plpgsql AS $$
+DECLARE
+    number bigint;
+BEGIN
+    -- Numbers appear in the outbox in another order than they are given; see `outbox.rs`.
+    IF ended IS NOT NULL THEN
+        PERFORM pg_advisory_xact_lock_shared(1400206453, hashtext(current_schema() || '/outbox'));
+    END IF;
+    UPDATE jobs SET seq = nextval('transitions'), record = new_record, kind = new_kind, kind_claimed = new_kind_claimed,
+        priority = new_priority, since = new_since, not_before = new_not_before, alone = new_alone, cancel = new_cancel,
+        recipe = new_recipe, epoch = new_epoch, token = new_token,
+        lease_until = CASE WHEN new_epoch IS NULL THEN NULL WHEN lease IS NULL THEN lease_until ELSE suture_now() + lease END,
+        fresh_key = CASE WHEN is_fresh THEN fresh_key END,
+        claim_token = NULL, claim_boot = NULL, claim_at = NULL, claim_call = NULL
+    WHERE id = job_id AND seq = seq_read AND (needed IS NULL OR token = needed)
+    RETURNING seq INTO number;
+    IF number IS NOT NULL AND ended IS NOT NULL THEN
+        INSERT INTO outbox (seq, job, record) SELECT number, job_id, ended WHERE EXISTS (SELECT 1 FROM subscribers);
+    END IF;
+    RETURN number;
+END $$;

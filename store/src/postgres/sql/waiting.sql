@@ -12,9 +12,15 @@ WITH t AS MATERIALIZED (
         ORDER BY since LIMIT 1
     ) o
     UNION ALL
-    SELECT priority, priority + least(9 - priority, greatest(0, t.now - since) / 1800000)
-    FROM jobs, t
-    WHERE kind = 'waiting' AND alone = $3 AND size BETWEEN $1 AND $2 AND folder <> ALL ($4)
-        AND not_before IS NOT NULL AND (not_before <= t.now OR not_before > t.now + 1800000)
+    SELECT r.priority, r.priority + least(9 - r.priority, greatest(0, t.now - r.since) / 1800000)
+    FROM t CROSS JOIN LATERAL (
+        SELECT priority, since FROM jobs
+        WHERE kind = 'waiting' AND not_before IS NOT NULL AND not_before <= t.now
+            AND alone = $3 AND size BETWEEN $1 AND $2 AND folder <> ALL ($4)
+        UNION ALL
+        SELECT priority, since FROM jobs
+        WHERE kind = 'waiting' AND not_before IS NOT NULL AND not_before > t.now + 1800000
+            AND alone = $3 AND size BETWEEN $1 AND $2 AND folder <> ALL ($4)
+    ) r
 )
 SELECT max(base)::bigint AS highest, max(aged)::bigint AS aged FROM best

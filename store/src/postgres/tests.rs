@@ -10,6 +10,7 @@ use crate::testkit::{Subject, conformance};
 
 mod farm;
 mod figures;
+mod lost;
 mod order;
 mod outage;
 mod schema;

@@ -90,6 +90,11 @@ impl Server {
         assert!(self.control().args(["-m", "immediate", "stop"]).status().unwrap().success());
     }
 
+    /// Where its socket is.
+    pub(super) fn folder(&self) -> &Path {
+        self.dir.path()
+    }
+
     /// A store of its own, for a daemon of that name.
     pub(super) fn schema(&self, daemon: &str) -> Shared {
         let number = self.schemas.fetch_add(1, Ordering::Relaxed);

@@ -27,6 +27,7 @@ pub mod store;
 mod tables;
 #[cfg(any(test, feature = "testkit"))]
 pub mod testkit;
+pub mod transfer;
 
 pub use crash::crash_point;
 pub use id::{Attempt, Boot, Clock, Epoch, Hash, JobId, Recipe, Seq, SystemClock, Time, Token};
@@ -40,3 +41,4 @@ pub use sled_store::{Opening, SledStore, Verified};
 pub use store::{
     Claim, Control, Filter, JobStore, Lease, Look, Page, Query, Recovered, StoreError, Submission, Submitted, Waiting,
 };
+pub use transfer::Transfer;

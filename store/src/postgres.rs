@@ -37,6 +37,7 @@ use crate::queue::submit::{CHUNK, can_be_taken};
 use crate::store::{
     Claim, Control, Filter, JobStore, Lease, Look, Page, Query, Recovered, StoreError, Submission, Submitted, Waiting,
 };
+use crate::transfer::{Holdings, Transfer};
 
 mod claim;
 mod database;
@@ -53,6 +54,7 @@ mod step;
 mod submit;
 #[cfg(test)]
 mod tests;
+mod transfer;
 
 use claim::Life;
 use database::{Again, Database, Failure, wait};
@@ -98,6 +100,14 @@ impl PostgresStore {
     fn over(open::Begun { runtime, end, database, life, claims }: open::Begun) -> Self {
         let (shut, calls, looked) = (Mutex::default(), AtomicI64::new(1), Mutex::default());
         Self { runtime: Some(runtime), end, database, life, claims, shut, calls, looked }
+    }
+
+    /// Looks at every row; a line for each that is damaged, or says something else than its record. Other daemons may go on meanwhile.
+    ///
+    /// # Errors
+    /// Where the database cannot be read, or holds a record of a newer version. A damaged record is a finding, not an error.
+    pub fn verify(&self) -> Result<Vec<String>, StoreError> {
+        self.ask(async |connection| transfer::verify(connection).await)
     }
 
     fn call<T: Send>(
@@ -164,6 +174,16 @@ impl Drop for PostgresStore {
         if let Some(runtime) = unheard.and_then(|unheard| Arc::into_inner(unheard.0)) {
             runtime.shutdown_background();
         }
+    }
+}
+
+impl Transfer for PostgresStore {
+    fn holdings(&self) -> Result<Holdings, StoreError> {
+        self.ask(async |connection| transfer::holdings(connection).await)
+    }
+
+    fn take_over(&self, holdings: &Holdings) -> Result<(), StoreError> {
+        self.call(Again::No, async |connection| transfer::take_over(connection, &self.life, holdings).await)
     }
 }
 

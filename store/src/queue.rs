@@ -42,6 +42,7 @@ pub(crate) mod past;
 mod recover;
 mod results;
 pub(crate) mod submit;
+mod transfer;
 
 use files::{Files, Identity};
 use line::{Line, Now};

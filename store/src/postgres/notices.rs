@@ -1,6 +1,6 @@
 //! Subscribers and what they have not heard of.
 
-use sqlx::postgres::PgConnection;
+use sqlx::postgres::{PgConnection, PgRow};
 use sqlx::{Connection, Row};
 
 use super::database::Failure;
@@ -41,16 +41,18 @@ pub(super) async fn notices(connection: &mut PgConnection, name: &str, most: usi
         WHERE o.seq <= $2 ORDER BY o.seq LIMIT $3";
     let most = int(u64::try_from(most).unwrap_or(u64::MAX));
     let rows = sqlx::query(entries).bind(name).bind(int(last.0)).bind(most).fetch_all(connection).await?;
-    let read = |row: &sqlx::postgres::PgRow| {
-        let (seq, job): (i64, Option<i64>) = (row.try_get("seq")?, row.try_get("job")?);
-        let (seq, bytes): (_, Vec<u8>) = (Seq(number(seq)), row.try_get("record")?);
-        let key = outbox::key(job.map(|job| JobId(number(job))));
-        Ok(match record::decode_notice(&key, &bytes)? {
-            Notice::End(job) => Notice::End(Box::new(Job { seq, ..*job })),
-            Notice::Word(word) => Notice::Word(Word { seq, ..word }),
-        })
-    };
-    rows.iter().map(read).collect()
+    rows.iter().map(entry).collect()
+}
+
+/// Reads a row with the columns `seq, job, record`.
+pub(super) fn entry(row: &PgRow) -> Result<Notice, Failure> {
+    let (seq, job): (i64, Option<i64>) = (row.try_get("seq")?, row.try_get("job")?);
+    let (seq, bytes): (_, Vec<u8>) = (Seq(number(seq)), row.try_get("record")?);
+    let key = outbox::key(job.map(|job| JobId(number(job))));
+    Ok(match record::decode_notice(&key, &bytes)? {
+        Notice::End(job) => Notice::End(Box::new(Job { seq, ..*job })),
+        Notice::Word(word) => Notice::Word(Word { seq, ..word }),
+    })
 }
 
 /// As [`crate::JobStore::acknowledge`].

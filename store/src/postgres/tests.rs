@@ -15,6 +15,7 @@ mod order;
 mod outage;
 mod schema;
 mod server;
+mod transfer;
 
 use server::{Server, server};
 

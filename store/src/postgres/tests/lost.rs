@@ -14,6 +14,8 @@ use crate::id::Attempt;
 use crate::store::Query;
 
 const JOBS: u64 = 60;
+/// No run takes as long.
+const LONGEST: Duration = Duration::from_secs(120);
 /// One message in so many does not arrive, and its connection ends with it.
 const EVERY: usize = 31;
 
@@ -69,9 +71,11 @@ fn calls_whose_answers_are_lost_are_done_once() {
         stores[0].submit(found).unwrap();
     }
     let finished = AtomicU64::new(0);
+    let began = Instant::now();
     let work = |store: &PostgresStore| {
         let mut done = BTreeMap::<JobId, u32>::new();
         while finished.load(Ordering::SeqCst) < JOBS {
+            assert!(began.elapsed() < LONGEST, "someone else has given up");
             let Some(claim) = store.claim(&Filter::default()).unwrap() else { continue };
             assert_eq!(store.heartbeat(&claim).unwrap(), Lease::Held);
             finish(store, &claim).unwrap();

@@ -10,6 +10,8 @@ use crate::id::Attempt;
 use crate::store::Query;
 
 const JOBS: u64 = 300;
+/// No run takes as long.
+const LONGEST: Duration = Duration::from_secs(120);
 
 /// Killed thrice while four threads of two daemons work: each job is claimed once, finished once and told once, and whoever asks meanwhile waits.
 #[test]
@@ -25,9 +27,11 @@ fn a_database_that_is_killed_and_started_again_loses_and_doubles_nothing() {
             submitted.fetch_add(found.len() as u64, Ordering::SeqCst);
         }
     };
+    let began = Instant::now();
     let work = |store: &PostgresStore| {
         let mut done = BTreeMap::<JobId, u32>::new();
         while finished.load(Ordering::SeqCst) < JOBS {
+            assert!(began.elapsed() < LONGEST, "someone else has given up");
             let Some(claim) = store.claim(&Filter::default()).unwrap() else {
                 std::thread::sleep(Duration::from_millis(5));
                 continue;

@@ -1,7 +1,8 @@
 //! From one store into another: all that a store holds, as lines of JSON, so that a farm can begin on one machine, grow, and shrink again.
 //!
-//! The first line is the head, the last one says how many lines there were and what their checksum is: a file that was cut short is refused. Claims do
-//! not go over: whoever held a job in the old store is taken for dead in the new one ([`crate::JobStore::recover`]). So the old store is to be at rest.
+//! The first line is the head, the last one says how many lines there were and what their checksum is: a file that was cut short is refused.
+//! Claims do not go over: whoever held a job in the old store is taken for dead in the new one ([`crate::JobStore::recover`]). So the old store
+//! is to be at rest.
 
 use std::collections::BTreeMap;
 use std::io::{self, BufRead, Write};

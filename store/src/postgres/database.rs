@@ -4,8 +4,8 @@ use std::io;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
+use sqlx::ConnectOptions;
 use sqlx::postgres::{PgConnectOptions, PgConnection};
-use sqlx::{ConnectOptions, Connection};
 use tokio::runtime::{Handle, Runtime};
 use tokio::sync::Semaphore;
 use tokio::time::{sleep, timeout};
@@ -118,9 +118,9 @@ impl Database {
                 Ok(value)
             }
             Err(failure) => {
-                // Whatever was open on it ends with it.
+                // A transaction that was not ended is taken back before the connection's next statement.
                 if matches!(failure, Failure::Store(_)) {
-                    _ = connection.close().await;
+                    self.idle().push(connection);
                 }
                 Err((true, failure))
             }

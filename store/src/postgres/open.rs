@@ -22,7 +22,8 @@ use crate::store::StoreError;
 /// A database that many daemons share, and who this one is.
 #[derive(Clone, Debug)]
 pub struct Shared {
-    /// `postgres://user@host/database`, with what its address may say of TLS (`sslmode=verify-full`, `sslrootcert=…`).
+    /// `postgres://user@host/database`, with what its address may say of TLS (`sslmode=verify-full`, `sslrootcert=…`). The database itself, or a
+    /// pooler that gives whole sessions: statements are prepared.
     pub url: String,
     /// The store's own schema: small letters, digits and `_`, at most 48 of them.
     pub schema: String,

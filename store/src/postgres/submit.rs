@@ -1,5 +1,5 @@
-//! Jobs that come into the store, and jobs that leave it. Transactions over several jobs begin with the head's row: they never wait for each other in a
-//! circle, and job numbers have no gaps.
+//! Jobs that come into the store, and jobs that leave it. Transactions over several jobs begin with the head's row: they never wait for each
+//! other in a circle, and job numbers have no gaps.
 
 use std::collections::BTreeMap;
 

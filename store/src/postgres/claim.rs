@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 
-use sqlx::Row;
 use sqlx::postgres::PgConnection;
+use sqlx::{Connection, Row};
 
 use super::database::Failure;
 use super::row::{Columns, Stored, int, number};
@@ -109,7 +109,9 @@ fn claim_of(stored: Stored) -> Result<Claim, Failure> {
 /// Takes back jobs whose leases have run out. One whose result was on its way comes with a new claim: nothing else is to be done for it.
 pub(super) async fn take_back(connection: &mut PgConnection, life: &Life, shut: &[String]) -> Result<Option<Claim>, Failure> {
     for _ in 0..MOST_TAKEN_BACK {
-        let row = sqlx::query(EXPIRED).bind(life.lease).bind(shut).fetch_optional(&mut *connection).await?;
+        // Under a lock: a holder that gives a sign just now is either in time, or finds that it was too late.
+        let mut transaction = connection.begin().await?;
+        let row = sqlx::query(EXPIRED).bind(life.lease).bind(shut).fetch_optional(&mut *transaction).await?;
         let Some(row) = row else { return Ok(None) };
         let stored = Stored::read(&row)?;
         let now = Time(number(row.try_get("now")?));
@@ -117,7 +119,8 @@ pub(super) async fn take_back(connection: &mut PgConnection, life: &Life, shut: 
         // Whoever is away says nothing, and no one can look there for a witness.
         let after = inherit(&stored.job, life, token, false, Testimony::None, now)?;
         let by = By::Heir { lease: life.lease };
-        let Some(seq) = set(connection, &stored, &after, &Columns::of(&after)?, by).await? else { continue };
+        let Some(seq) = set(&mut transaction, &stored, &after, &Columns::of(&after)?, by).await? else { continue };
+        transaction.commit().await?;
         tracing::warn!(job = after.id.0, "The lease of a job ran out: its daemon is gone, stopped or cut off. It is taken back.");
         if after.hold().is_some() {
             return Ok(Some(Claim { id: after.id, token, job: Job { seq, ..after } }));

@@ -51,8 +51,9 @@ fn two_stores_and_eight_threads_take_each_job_once_and_tell_each_end_once() {
         let workers: Vec<_> = (0..8).map(|at| &stores[at % 2]).map(|store| scope.spawn(|| work(store))).collect();
         // Whoever listens meanwhile misses no end, in whatever order they become durable.
         let listener = scope.spawn(|| {
-            let (mut heard, mut last) = (Vec::new(), Seq(0));
+            let (mut heard, mut last, began) = (Vec::new(), Seq(0), Instant::now());
             while heard.len() < 200 {
+                assert!(began.elapsed() < Duration::from_secs(120), "an end was missed; {} were told", heard.len());
                 for notice in stores[1].notices("farm", 7).unwrap() {
                     let Notice::End(job) = notice else { panic!("no news") };
                     assert!(job.seq > last);

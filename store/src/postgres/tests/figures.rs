@@ -32,9 +32,10 @@ fn claims_and_completions_per_second() {
         });
         let seconds = began.elapsed().as_secs_f64();
         eprintln!(
-            "{connections} connections, {waiting} waiting (taken in: {:.0} a second): {:.0} jobs a second",
+            "{connections} connections, {waiting} waiting (taken in: {:.0} a second): {:.0} jobs a second, {:.0} commits",
             waiting as f64 / took_in,
-            JOBS as f64 / seconds
+            JOBS as f64 / seconds,
+            4.0 * JOBS as f64 / seconds
         );
     }
 }

@@ -84,3 +84,21 @@ fn patience_ends_and_the_store_does_not() {
     let claim = store.claim(&Filter::default()).unwrap().unwrap();
     assert_eq!(finish(&store, &claim).unwrap().kind(), Kind::Done);
 }
+
+/// Leases that ran out while the database was away could not be kept by anyone: whoever lives has a lease's time to say so.
+#[test]
+fn what_ran_out_while_the_database_was_away_is_given_one_more_lease() {
+    let Some(server) = Server::start() else { return };
+    let shared = Shared { lease: Duration::from_secs(6), ..server.schema("gone") };
+    let gone = PostgresStore::open(&shared).unwrap();
+    gone.submit(&files(1)).unwrap();
+    let claim = gone.claim(&Filter::default()).unwrap().unwrap();
+    drop(gone);
+    server.kill();
+    std::thread::sleep(shared.lease);
+    server.run();
+    let other = PostgresStore::open(&other(&shared, "other")).unwrap();
+    assert_eq!(other.claim(&Filter::default()).unwrap(), None);
+    std::thread::sleep(shared.lease);
+    assert_eq!(other.claim(&Filter::default()).unwrap().map(|again| again.id), Some(claim.id));
+}

@@ -1,5 +1,6 @@
 //! A database server of the tests' own, on a socket in a temporary folder, which ends with the test program however that ends.
 
+use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::sync::OnceLock;
@@ -62,7 +63,8 @@ impl Server {
         let script = "read -r _; \"$1\" -D \"$2\" -m immediate stop; rm -rf \"$3\"";
         let mut cleaner = as_user(Path::new("sh"), dir.path());
         cleaner.args(["-c", script, "sh"]).arg(bin.join("pg_ctl")).arg(&data).arg(dir.path());
-        let cleaner = cleaner.stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+        // A signal to the test program's group, as from a terminal, is not for it.
+        let cleaner = cleaner.process_group(0).stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
         let server = Self { dir, bin, _cleaner: cleaner, schemas: AtomicU32::new(0) };
         server.run();
         Some(server)

@@ -2,7 +2,7 @@
 //!
 //! * [`job`] is the pure state machine: which event may follow which state, who is to blame, when to try again. No I/O.
 //! * [`store`] is the [`JobStore`] trait, what a queue must promise; [`MemoryStore`] is its model, [`SledStore`] the embedded
-//!   default. A shared queue can stand in: claims are fenced by tokens, transitions are compare-and-set, submission is
+//!   default, `PostgresStore` (feature `postgres`) the one that many daemons share: claims are fenced by tokens, transitions are compare-and-set, submission is
 //!   idempotent.
 //! * [`crash`] holds the crash points that the tests of store and daemon kill the process at.
 //!
@@ -17,6 +17,8 @@ pub mod job;
 mod memory;
 mod news;
 pub mod path;
+#[cfg(feature = "postgres")]
+mod postgres;
 mod queue;
 mod record;
 mod sled_store;
@@ -25,6 +27,7 @@ pub mod store;
 mod tables;
 #[cfg(any(test, feature = "testkit"))]
 pub mod testkit;
+pub mod transfer;
 
 pub use crash::crash_point;
 pub use id::{Attempt, Boot, Clock, Epoch, Hash, JobId, Recipe, Seq, SystemClock, Time, Token};
@@ -32,7 +35,10 @@ pub use job::{Decision, Ending, Job, Kind, Past, Priority, Publication, Reached,
 pub use memory::MemoryStore;
 pub use news::{News, Notice, Word};
 pub use path::RelPath;
+#[cfg(feature = "postgres")]
+pub use postgres::{PostgresStore, Shared, role};
 pub use sled_store::{Opening, SledStore, Verified};
 pub use store::{
     Claim, Control, Filter, JobStore, Lease, Look, Page, Query, Recovered, StoreError, Submission, Submitted, Waiting,
 };
+pub use transfer::Transfer;

@@ -12,6 +12,7 @@ use crate::store::{
     Claim, Control, Filter, JobStore, Lease, Look, Page, Query, Recovered, StoreError, Submission, Submitted, Waiting,
 };
 use crate::tables::{Put, Table, Tables, Visit};
+use crate::transfer::{Holdings, Transfer};
 
 /// A [`JobStore`] that forgets everything when it is dropped.
 pub struct MemoryStore {
@@ -99,6 +100,16 @@ impl Tables for Memory {
 
     fn sound(&self) -> Result<(), StoreError> {
         Ok(())
+    }
+}
+
+impl Transfer for MemoryStore {
+    fn holdings(&self) -> Result<Holdings, StoreError> {
+        self.queue.holdings()
+    }
+
+    fn take_over(&self, holdings: &Holdings) -> Result<(), StoreError> {
+        self.queue.take_over(holdings)
     }
 }
 

@@ -34,14 +34,15 @@ mod forget;
 mod index;
 mod line;
 mod marks;
-mod notices;
+pub(crate) mod notices;
 mod offered;
 mod outbox;
 mod page;
-mod past;
+pub(crate) mod past;
 mod recover;
 mod results;
-mod submit;
+pub(crate) mod submit;
+mod transfer;
 
 use files::{Files, Identity};
 use line::{Line, Now};
@@ -446,7 +447,8 @@ fn unfilled_put() -> Result<Put, StoreError> {
     Ok(Put { table: Table::Meta, key: UNFILLED.to_vec(), value: Some(record::encode(Table::Meta, UNFILLED, &true)?) })
 }
 
-fn fits(what: &str, name: &str) -> Result<(), StoreError> {
+/// Does a name fit a record?
+pub(crate) fn fits(what: &str, name: &str) -> Result<(), StoreError> {
     let length = serde_json::to_string(name).map_or(usize::MAX, |text| text.len());
     if length > MAX_NAME { Err(StoreError::TooLong { what: format!("{what} {name:?}") }) } else { Ok(()) }
 }

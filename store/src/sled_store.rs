@@ -40,6 +40,7 @@ use crate::queue::Queue;
 use crate::store::{
     Claim, Control, Filter, JobStore, Lease, Look, Page, Query, Recovered, StoreError, Submission, Submitted, Waiting,
 };
+use crate::transfer::{Holdings, Transfer};
 
 mod files;
 #[cfg(test)]
@@ -137,6 +138,16 @@ impl Drop for SledStore {
         if let Err(error) = tables.note(self.queue.reached()) {
             tracing::warn!(%error, "the store could not note how far it got; nothing acknowledged is lost");
         }
+    }
+}
+
+impl Transfer for SledStore {
+    fn holdings(&self) -> Result<Holdings, StoreError> {
+        self.queue.holdings()
+    }
+
+    fn take_over(&self, holdings: &Holdings) -> Result<(), StoreError> {
+        self.queue.take_over(holdings)
     }
 }
 

@@ -1,6 +1,7 @@
 //! Marks of what was told last of the service itself, so that nothing is told twice, also not by another life of the daemon. Each folder that is away has
 //! an entry of its own in the table `meta`, and the end of the last night has one; the entry and the word of it for subscribers are one transaction.
 
+use std::collections::BTreeMap;
 use std::sync::MutexGuard;
 
 use super::{Inner, Queue, fits, head_put, outbox};
@@ -12,11 +13,24 @@ use crate::record;
 use crate::store::StoreError;
 use crate::tables::{Put, Table, Tables};
 
-const NIGHT: &[u8] = b"night";
+pub(super) const NIGHT: &[u8] = b"night";
+const AWAY: &[u8] = b"away/";
 
 /// The key of a folder that is away.
-fn away(folder: &str) -> Vec<u8> {
-    [b"away/", folder.as_bytes()].concat()
+pub(super) fn away(folder: &str) -> Vec<u8> {
+    [AWAY, folder.as_bytes()].concat()
+}
+
+/// Folders that are away, and since when that was told.
+pub(super) fn away_folders(tables: &dyn Tables) -> Result<BTreeMap<String, Time>, StoreError> {
+    let mut folders = BTreeMap::new();
+    // `0` comes after `/`.
+    tables.scan(Table::Meta, AWAY, b"away0", &mut |key, value| {
+        let folder = key.strip_prefix(AWAY).unwrap_or_default();
+        folders.insert(String::from_utf8_lossy(folder).into_owned(), record::decode(Table::Meta, key, value)?);
+        Ok(true)
+    })?;
+    Ok(folders)
 }
 
 impl<T: Tables> Queue<T> {

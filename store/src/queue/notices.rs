@@ -14,13 +14,19 @@ use crate::tables::{Put, Table, Tables};
 /// Entries removed by one transaction of the tables.
 const CHUNK: usize = 1000;
 
+/// Do they fit a record?
+pub(crate) fn can_be_subscribers(names: &[String]) -> Result<(), StoreError> {
+    names.iter().try_for_each(|name| fits("the subscriber's name", name))?;
+    if names.len() > MOST_SUBSCRIBERS {
+        return Err(StoreError::TooLong { what: format!("the list of {} subscribers", names.len()) });
+    }
+    Ok(())
+}
+
 impl<T: Tables> Queue<T> {
     /// As [`crate::JobStore::subscribe`].
     pub(super) fn set_subscribers(&self, names: &[String]) -> Result<(), StoreError> {
-        names.iter().try_for_each(|name| fits("the subscriber's name", name))?;
-        if names.len() > MOST_SUBSCRIBERS {
-            return Err(StoreError::TooLong { what: format!("the list of {} subscribers", names.len()) });
-        }
+        can_be_subscribers(names)?;
         self.tables.sound()?;
         let inner = self.lock();
         let seq_of = |name: &String| inner.subscribers.get(name).copied().unwrap_or(inner.head.seq);

@@ -14,7 +14,7 @@ use crate::store::StoreError;
 use crate::tables::{Put, Table, Tables};
 
 /// No store comes as far. Numbers come from files that anyone may have written.
-const HIGHEST: u64 = 1 << 48;
+pub(crate) const HIGHEST: u64 = 1 << 48;
 
 impl<T: Tables> Queue<T> {
     /// As [`crate::JobStore::is_unfilled`].
@@ -75,7 +75,7 @@ impl<T: Tables> Queue<T> {
 }
 
 /// Does it fit a record, with all that may still come of it?
-fn can_be_recorded(past: &Past) -> Result<(), StoreError> {
+pub(crate) fn can_be_recorded(past: &Past) -> Result<(), StoreError> {
     let p = &past.publication;
     let short = |path: &RelPath, most: usize| match path.to_string().len() <= most {
         true => Ok(()),

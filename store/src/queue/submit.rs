@@ -11,22 +11,13 @@ use crate::store::{StoreError, Submission, Submitted};
 use crate::tables::Tables;
 
 /// Jobs taken in by one transaction of the tables.
-pub(super) const CHUNK: usize = 1000;
+pub(crate) const CHUNK: usize = 1000;
 
 impl<T: Tables> Queue<T> {
     /// As [`crate::JobStore::submit`].
     pub(super) fn take_in(&self, found: &[Submission]) -> Result<Vec<Submitted>, StoreError> {
         self.tables.sound()?;
-        for submission in found {
-            let path = &submission.source.path;
-            if path.to_string().len() > MAX_SOURCE {
-                return Err(StoreError::TooLong {
-                    what: format!("the path of {} bytes that begins with {}", path.as_bytes().len(), path.beginning()),
-                });
-            }
-            fits("the folder's name", &submission.source.folder)?;
-            fits("the profile's name", &submission.source.profile)?;
-        }
+        can_be_taken(found)?;
         let mut answers = Vec::with_capacity(found.len());
         let mut last = None;
         for chunk in found.chunks(CHUNK) {
@@ -83,8 +74,23 @@ impl<T: Tables> Queue<T> {
     }
 }
 
+/// Does each of them fit a record?
+pub(crate) fn can_be_taken(found: &[Submission]) -> Result<(), StoreError> {
+    for submission in found {
+        let path = &submission.source.path;
+        if path.to_string().len() > MAX_SOURCE {
+            return Err(StoreError::TooLong {
+                what: format!("the path of {} bytes that begins with {}", path.as_bytes().len(), path.beginning()),
+            });
+        }
+        fits("the folder's name", &submission.source.folder)?;
+        fits("the profile's name", &submission.source.profile)?;
+    }
+    Ok(())
+}
+
 /// The job of a file that no job answers for.
-fn found_now(id: JobId, submission: &Submission, now: Time) -> Job {
+pub(crate) fn found_now(id: JobId, submission: &Submission, now: Time) -> Job {
     let source = submission.source.clone();
     let job = match &submission.foreign {
         None => Job::queued(id, source, now),

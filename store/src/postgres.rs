@@ -1,0 +1,353 @@
+//! The shared store, on PostgreSQL: many daemons, on one machine or on many, work on one queue.
+//!
+//! | what                | how                                                                                                       |
+//! |---------------------|-----------------------------------------------------------------------------------------------------------|
+//! | a claim             | one statement (`sql/claim.sql`), rows that others are about to take skipped                               |
+//! | a step              | the row is read, judged by the state machine, and set if it is still the one that was read                |
+//! | who may step        | the holder of the row's token; a new claim, and the end of the holder's life, takes it from him           |
+//! | time                | the database's clock; what a machine says of itself is only which start of it this is                     |
+//! | leases              | end by that clock, begin anew with each step, heartbeat, and by a task of the store's own while it lives  |
+//! | a daemon's life     | a row of `lives`: a daemon of the same name that begins ends those before                                 |
+//! | numbers             | of transitions: a sequence, with gaps; of jobs: the head's row, without                                   |
+//!
+//! **Errors.** While the database is away, calls wait for it and are made again, up to the store's patience; each sees for itself whether it was done
+//! before. A call that gave up says [`StoreError::Backend`]; only [`JobStore::restore`] and [`JobStore::recover`] do so at once, when a connection
+//! ends in the middle. Of a submission that had to be made again, the files may be said to be known already, and of news, that they are no news: they
+//! were taken in by the first try. Nothing that was acknowledged is lost, as far as the database keeps its word; one that runs without `fsync` is
+//! refused.
+
+use std::collections::BTreeSet;
+use std::sync::atomic::{AtomicI64, AtomicU32, Ordering};
+use std::sync::mpsc::Sender;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+use sqlx::postgres::PgConnection;
+use tokio::runtime::Runtime;
+
+#[cfg(any(test, feature = "testkit"))]
+use crate::id::Clock;
+use crate::id::{JobId, Recipe, Seq, Time};
+use crate::job::{Event, Illegal, Job, Kind, Past, Source, Step, Testimony, one_line};
+use crate::news::{News, Notice};
+use crate::queue::fits;
+use crate::queue::notices::can_be_subscribers;
+use crate::queue::past::can_be_recorded;
+use crate::queue::submit::{CHUNK, can_be_taken};
+use crate::store::{
+    Claim, Control, Filter, JobStore, Lease, Look, Page, Query, Recovered, StoreError, Submission, Submitted, Waiting,
+};
+use crate::transfer::{Holdings, Transfer};
+
+mod claim;
+mod database;
+mod leases;
+mod look;
+mod marks;
+mod migrate;
+mod notices;
+mod open;
+mod outbox;
+mod recover;
+mod row;
+mod step;
+mod submit;
+#[cfg(test)]
+mod tests;
+mod transfer;
+
+use claim::Life;
+use database::{Again, Database, Failure, wait};
+use leases::Claims;
+pub use open::{Shared, role};
+use step::By;
+
+/// The shared [`JobStore`].
+pub struct PostgresStore {
+    runtime: Option<Arc<Runtime>>,
+    /// Ends the thread that keeps the leases, which drops the runtime: whoever drops the store may be part of another one.
+    end: Sender<Arc<Runtime>>,
+    database: Arc<Database>,
+    life: Life,
+    claims: Arc<Claims>,
+    shut: Mutex<Vec<String>>,
+    /// Names claims among all of this life.
+    calls: AtomicI64,
+    /// When leases of others were looked at last. Only how often depends on it.
+    looked: Mutex<Option<Instant>>,
+}
+
+impl PostgresStore {
+    /// Opens the shared store, or makes it, and begins a new life of the daemon. What its earlier lives left running is found by
+    /// [`JobStore::recover`].
+    ///
+    /// # Errors
+    /// [`StoreError::Newer`] and [`StoreError::Unusable`] when the schema is another program's, or the database does not keep what it acknowledges;
+    /// [`StoreError::Backend`] when it cannot be reached.
+    pub fn open(shared: &Shared) -> Result<Self, StoreError> {
+        open::begin(shared, None).map(Self::over)
+    }
+
+    /// The same under a clock that the caller sets, for tests: no machine's clock is asked.
+    ///
+    /// # Errors
+    /// As [`PostgresStore::open`].
+    #[cfg(any(test, feature = "testkit"))]
+    pub fn open_at(shared: &Shared, clock: Arc<dyn Clock>) -> Result<Self, StoreError> {
+        open::begin(shared, Some(clock)).map(Self::over)
+    }
+
+    fn over(open::Begun { runtime, end, database, life, claims }: open::Begun) -> Self {
+        let (shut, calls, looked) = (Mutex::default(), AtomicI64::new(1), Mutex::default());
+        Self { runtime: Some(runtime), end, database, life, claims, shut, calls, looked }
+    }
+
+    /// Looks at every row; a line for each that is damaged, or says something else than its record. Other daemons may go on meanwhile.
+    ///
+    /// # Errors
+    /// Where the database cannot be read, or holds a record of a newer version. A damaged record is a finding, not an error.
+    pub fn verify(&self) -> Result<Vec<String>, StoreError> {
+        self.ask(async |connection| transfer::verify(connection).await)
+    }
+
+    fn call<T: Send>(
+        &self,
+        again: Again,
+        call: impl AsyncFn(&mut PgConnection) -> Result<T, Failure> + Sync,
+    ) -> Result<T, StoreError> {
+        let Some(runtime) = &self.runtime else { return Err(StoreError::Poisoned { reason: "the store was closed".into() }) };
+        wait(runtime, async || self.database.call(again, &call).await)
+    }
+
+    fn ask<T: Send>(&self, call: impl AsyncFn(&mut PgConnection) -> Result<T, Failure> + Sync) -> Result<T, StoreError> {
+        self.call(Again::Yes, call)
+    }
+
+    fn folders_shut(&self) -> Vec<String> {
+        self.shut.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
+    /// Is it time to look at the leases of others?
+    fn is_time_to_look(&self) -> bool {
+        let mut looked = self.looked.lock().unwrap_or_else(PoisonError::into_inner);
+        let pause = Duration::from_millis(self.life.lease.unsigned_abs() / 4);
+        let is_time = looked.is_none_or(|looked| looked.elapsed() >= pause);
+        if is_time {
+            *looked = Some(Instant::now());
+        }
+        is_time
+    }
+
+    fn take_back(&self) -> Result<Option<Claim>, StoreError> {
+        let shut = self.folders_shut();
+        self.ask(async |connection| claim::take_back(connection, &self.life, &shut).await)
+    }
+
+    fn next(&self, want: &Filter) -> Result<Option<Claim>, StoreError> {
+        let (shut, call, tries) = (self.folders_shut(), self.calls.fetch_add(1, Ordering::Relaxed), AtomicU32::new(0));
+        self.ask(async |connection| {
+            let again = tries.fetch_add(1, Ordering::Relaxed) > 0;
+            claim::claim(connection, &self.life, want, &shut, call, again).await
+        })
+    }
+
+    fn find_claim(&self, want: &Filter) -> Result<Option<Claim>, StoreError> {
+        let has_looked = self.is_time_to_look();
+        if has_looked && let Some(claim) = self.take_back()? {
+            return Ok(Some(claim));
+        }
+        let found = self.next(want)?;
+        if found.is_some() || has_looked {
+            return Ok(found);
+        }
+        // With nothing else to do, what others have lost is wanted at once.
+        match self.take_back()? {
+            Some(claim) => Ok(Some(claim)),
+            None => self.next(want),
+        }
+    }
+}
+
+impl Drop for PostgresStore {
+    fn drop(&mut self) {
+        let unheard = self.runtime.take().and_then(|runtime| self.end.send(runtime).err());
+        if let Some(runtime) = unheard.and_then(|unheard| Arc::into_inner(unheard.0)) {
+            runtime.shutdown_background();
+        }
+    }
+}
+
+impl Transfer for PostgresStore {
+    fn holdings(&self) -> Result<Holdings, StoreError> {
+        self.ask(async |connection| transfer::holdings(connection).await)
+    }
+
+    fn take_over(&self, holdings: &Holdings) -> Result<(), StoreError> {
+        self.call(Again::No, async |connection| transfer::take_over(connection, &self.life, holdings).await)
+    }
+}
+
+impl JobStore for PostgresStore {
+    fn submit(&self, found: &[Submission]) -> Result<Vec<Submitted>, StoreError> {
+        can_be_taken(found)?;
+        let mut answers = Vec::with_capacity(found.len());
+        for chunk in found.chunks(CHUNK) {
+            answers.extend(self.ask(async |connection| submit::submit(connection, chunk).await)?);
+        }
+        Ok(answers)
+    }
+
+    fn claim(&self, want: &Filter) -> Result<Option<Claim>, StoreError> {
+        let claim = self.find_claim(want)?;
+        claim.iter().for_each(|claim| self.claims.keep(claim));
+        Ok(claim)
+    }
+
+    fn has_parked(&self) -> Result<bool, StoreError> {
+        let shut = self.folders_shut();
+        self.ask(async |connection| claim::has_parked(connection, &shut).await)
+    }
+
+    fn waiting(&self, want: &Filter) -> Result<Option<Waiting>, StoreError> {
+        let shut = self.folders_shut();
+        self.ask(async |connection| claim::waiting(connection, want, &shut).await)
+    }
+
+    fn shut(&self, folders: &BTreeSet<String>) {
+        *self.shut.lock().unwrap_or_else(PoisonError::into_inner) = folders.iter().cloned().collect();
+    }
+
+    fn heartbeat(&self, claim: &Claim) -> Result<Lease, StoreError> {
+        let lease = self.ask(async |connection| claim::heartbeat(connection, &self.life, claim).await)?;
+        if lease == Lease::Lost {
+            self.claims.end(claim);
+        }
+        Ok(lease)
+    }
+
+    fn advance(&self, claim: &Claim, step: Step) -> Result<Job, StoreError> {
+        let by = By::Holder { token: claim.token, lease: self.life.lease };
+        let tried = Mutex::new(None);
+        let stepped = self.ask(async |connection| {
+            step::transition(connection, claim.id, by, &tried, |stored| {
+                let is_held = stored.token == Some(claim.token) && stored.epoch == Some(self.life.epoch);
+                is_held.then(|| Event::Step { token: claim.token, step: step.clone() }).ok_or(Illegal::Fenced)
+            })
+            .await
+        });
+        let is_over = match &stepped {
+            Ok(job) => job.hold().is_none(),
+            Err(StoreError::Illegal { source, .. }) => *source == Illegal::Fenced,
+            Err(_) => false,
+        };
+        if is_over {
+            self.claims.end(claim);
+        }
+        stepped
+    }
+
+    fn control(&self, id: JobId, wish: Control) -> Result<Job, StoreError> {
+        let event = match wish {
+            Control::Retry => Event::Retry,
+            Control::Cancel => Event::Cancel,
+            Control::Forget => Event::Forget,
+            Control::Hasten => Event::Hasten,
+            Control::Rank(priority) => Event::Rank(priority),
+            Control::Decide(decision) => Event::Decide(decision),
+        };
+        let tried = Mutex::new(None);
+        self.ask(async |connection| step::transition(connection, id, By::Operator, &tried, |_| Ok(event.clone())).await)
+    }
+
+    fn recover(&self, testimony: &dyn Fn(&Job) -> Testimony) -> Result<Vec<Recovered>, StoreError> {
+        let orphans = self.ask(async |connection| recover::orphans(connection, &self.life).await)?;
+        let verdicts = recover::ask(&orphans, &self.life, testimony);
+        let recovered = self.call(Again::No, async |connection| recover::take_back(connection, &self.life, &verdicts).await)?;
+        recovered.iter().filter_map(|one| one.claim.as_ref()).for_each(|claim| self.claims.keep(claim));
+        Ok(recovered)
+    }
+
+    fn get(&self, id: JobId) -> Result<Option<Job>, StoreError> {
+        self.ask(async |connection| look::get(connection, id).await)
+    }
+
+    fn list(&self, query: &Query) -> Result<Vec<Job>, StoreError> {
+        self.ask(async |connection| look::list(connection, query).await)
+    }
+
+    fn page(&self, look: &Look) -> Result<Page, StoreError> {
+        self.ask(async |connection| look::page(connection, look).await)
+    }
+
+    fn find(&self, source: &Source) -> Result<Option<JobId>, StoreError> {
+        self.ask(async |connection| look::find(connection, source).await)
+    }
+
+    fn results(&self, size: u64, recipe: Option<Recipe>) -> Result<Vec<Job>, StoreError> {
+        self.ask(async |connection| look::results(connection, size, recipe).await)
+    }
+
+    fn check(&self) -> Result<(), StoreError> {
+        self.ask(async |connection| claim::check(connection, &self.life).await)
+    }
+
+    fn forget(&self, ids: &[JobId]) -> Result<u64, StoreError> {
+        let chunks = ids.chunks(CHUNK);
+        chunks.map(|chunk| self.ask(async |connection| submit::forget(connection, chunk).await)).sum()
+    }
+
+    fn is_unfilled(&self) -> Result<bool, StoreError> {
+        self.ask(async |connection| marks::is_unfilled(connection).await)
+    }
+
+    fn restore(&self, past: &[Past]) -> Result<Vec<JobId>, StoreError> {
+        past.iter().try_for_each(can_be_recorded)?;
+        let mut ids = Vec::with_capacity(past.len());
+        for chunk in past.chunks(CHUNK) {
+            ids.extend(self.call(Again::No, async |connection| submit::restore(connection, chunk).await)?);
+        }
+        Ok(ids)
+    }
+
+    fn set_filled(&self) -> Result<(), StoreError> {
+        self.ask(async |connection| marks::set_filled(connection).await)
+    }
+
+    fn subscribe(&self, names: &[String]) -> Result<(), StoreError> {
+        can_be_subscribers(names)?;
+        self.ask(async |connection| notices::subscribe(connection, names).await)
+    }
+
+    fn notices(&self, name: &str, most: usize) -> Result<Vec<Notice>, StoreError> {
+        self.ask(async |connection| notices::notices(connection, name, most).await)
+    }
+
+    fn acknowledge(&self, name: &str, seq: Seq) -> Result<(), StoreError> {
+        self.ask(async |connection| notices::acknowledge(connection, name, seq).await)
+    }
+
+    fn backlog(&self, name: &str) -> Result<u64, StoreError> {
+        self.ask(async |connection| notices::backlog(connection, name).await)
+    }
+
+    fn tell(&self, news: &News) -> Result<bool, StoreError> {
+        let mut news = news.clone();
+        if let News::FolderAway { folder, reason } = &mut news {
+            fits("the folder's name", folder)?;
+            *reason = one_line(reason);
+        }
+        self.ask(async |connection| marks::tell(connection, &news).await)
+    }
+
+    fn last_night(&self) -> Result<Option<Time>, StoreError> {
+        self.ask(async |connection| marks::last_night(connection).await)
+    }
+
+    fn begin_night(&self, at: Time) -> Result<(), StoreError> {
+        self.ask(async |connection| marks::begin_night(connection, at).await)
+    }
+
+    fn counts(&self) -> Result<Vec<(Kind, u64)>, StoreError> {
+        self.ask(async |connection| look::counts(connection).await)
+    }
+}

@@ -1,0 +1,54 @@
+//! Leases of the claims that a store has given out: as long as the store lives, so do they, whatever its callers are busy with.
+
+use std::collections::BTreeMap;
+use std::sync::mpsc::{Receiver, RecvTimeoutError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+use tokio::runtime::Runtime;
+
+use super::claim::{Life, extend};
+use super::database::{Again, Database, wait};
+use crate::id::{JobId, Token};
+use crate::store::Claim;
+
+/// The claims that this life has given out and that have not ended. One whose answer was lost on the way is not among them, and runs out.
+#[derive(Default)]
+pub(super) struct Claims(Mutex<BTreeMap<JobId, Token>>);
+
+impl Claims {
+    fn lock(&self) -> MutexGuard<'_, BTreeMap<JobId, Token>> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn tokens(&self) -> Vec<Token> {
+        self.lock().values().copied().collect()
+    }
+
+    pub(super) fn keep(&self, claim: &Claim) {
+        self.lock().insert(claim.id, claim.token);
+    }
+
+    pub(super) fn end(&self, claim: &Claim) {
+        let mut claims = self.lock();
+        if claims.get(&claim.id) == Some(&claim.token) {
+            claims.remove(&claim.id);
+        }
+    }
+}
+
+/// Begins the leases of all claims anew, again and again, until the store ends: as long as the daemon lives, so do its claims.
+pub(super) fn keep_leases(runtime: &Runtime, database: &Database, life: &Life, claims: &Claims, ended: &Receiver<Arc<Runtime>>) {
+    let pause = Duration::from_millis(life.lease.unsigned_abs() / 4);
+    while let Err(RecvTimeoutError::Timeout) = ended.recv_timeout(pause) {
+        let tokens = claims.tokens();
+        if tokens.is_empty() {
+            continue;
+        }
+        let kept =
+            wait(runtime, async || database.call(Again::Yes, async |connection| extend(connection, life, &tokens).await).await);
+        if let Err(error) = kept {
+            tracing::warn!(%error, "The leases of this daemon's jobs could not be kept; others may take them.");
+        }
+    }
+}

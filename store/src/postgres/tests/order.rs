@@ -1,0 +1,67 @@
+//! Who is next, compared with the model: the statement that claims, and the line in memory, give the same job.
+
+use super::*;
+use crate::job::{AGEING_MS, Priority};
+use crate::memory::MemoryStore;
+use crate::testkit::{ManualClock, dropped};
+
+/// A small generator, so that a failure can be run again.
+struct Numbers(u64);
+
+impl Numbers {
+    fn below(&mut self, end: u64) -> u64 {
+        self.0 ^= self.0 << 13;
+        self.0 ^= self.0 >> 7;
+        self.0 ^= self.0 << 17;
+        self.0 % end
+    }
+}
+
+type Seen = Result<(Kind, Option<Time>, crate::job::Blame, crate::id::Attempt), String>;
+
+fn step(store: &dyn JobStore, claim: &Claim, step: &Step) -> Seen {
+    let after = store.advance(claim, step.clone()).map_err(|error| error.to_string())?;
+    Ok((after.kind(), after.pause(), after.blame, after.attempts))
+}
+
+#[test]
+fn the_statement_and_the_model_agree_on_who_is_next() {
+    let Some(server) = server() else { return };
+    for seed in 1..=4 {
+        let clock = Arc::new(ManualClock::new(Time(1_000_000)));
+        let model = MemoryStore::new(Arc::clone(&clock) as Arc<dyn Clock>);
+        let shared = server.schema("daemon");
+        let store = PostgresStore::open_at(&shared, Arc::clone(&clock) as Arc<dyn Clock>).unwrap();
+        let stores: [&dyn JobStore; 2] = [&model, &store];
+        let (mut numbers, mut claimed) = (Numbers(seed), 0);
+        for at in 0..150 {
+            let mut found = dropped(&format!("{at}.stl"), numbers.below(1000)).unwrap();
+            found.priority = Priority::try_from(i64::try_from(numbers.below(10)).unwrap()).unwrap();
+            found.source.folder = ["hot", "cold"][usize::try_from(numbers.below(2)).unwrap()].into();
+            for store in stores {
+                store.submit(std::slice::from_ref(&found)).unwrap();
+            }
+            clock.pass(numbers.below(AGEING_MS));
+            let closed: BTreeSet<String> = if numbers.below(4) == 0 { ["cold".into()].into() } else { BTreeSet::new() };
+            stores.iter().for_each(|store| store.shut(&closed));
+            let (least, alone) = (numbers.below(500), numbers.below(8) == 0);
+            let want = Filter { size: (least, least + numbers.below(1000)), alone };
+            let [expected, waiting] = stores.map(|store| store.waiting(&want).unwrap());
+            assert_eq!(waiting, expected, "seed {seed}, step {at}");
+            if numbers.below(3) == 0 {
+                continue;
+            }
+            let [expected, claim] = stores.map(|store| store.claim(&want).unwrap());
+            assert_eq!(claim.as_ref().map(|claim| claim.id), expected.as_ref().map(|claim| claim.id), "seed {seed}, step {at}");
+            let (Some(expected), Some(claim)) = (expected, claim) else { continue };
+            claimed += 1;
+            // Some come back after a pause, some at once, some never.
+            let what = [Step::Environment { reason: "full".into() }, Step::HandBack, Step::NeedsAll, Step::Cancelled]
+                [usize::try_from(numbers.below(4)).unwrap()]
+            .clone();
+            let [expected, after] = [step(&model, &expected, &what), step(&store, &claim, &what)];
+            assert_eq!(after, expected, "seed {seed}, step {at}");
+        }
+        assert!(claimed > 30, "seed {seed}: {claimed}");
+    }
+}

@@ -5,7 +5,6 @@
 //! **Promise:** a path of a hot folder is copied into the attempt's own folder, since a worker reaches nothing else; it is never changed nor moved.
 
 use std::ffi::{OsStr, OsString};
-use std::fs::File;
 use std::io;
 use std::os::unix::ffi::{OsStrExt, OsStringExt};
 use std::path::{Component, Path, PathBuf};
@@ -16,6 +15,7 @@ use suture_core::Profile;
 use suture_store::{Job, Time};
 
 use crate::claim::Original;
+use crate::create;
 use crate::folder::Folder;
 use crate::fsx::{self, Identity};
 use crate::writers::Writers;
@@ -94,9 +94,7 @@ fn copy(from: &Path, to: &Path, (now, settle): (Time, Duration)) -> io::Result<b
     if is_young || Writers::default().has(original.file(), &before) {
         return Ok(false);
     }
-    fsx::remove_if_there(to)?;
-    let mut target = File::options().write(true).create_new(true).open(to)?;
-    io::copy(&mut original.file(), &mut target)?;
+    create::copy_new(original.file(), to)?;
     let is_same = Identity::of(from).is_ok_and(|after| after == before);
     if !is_same {
         fsx::remove_if_there(to)?;
@@ -131,6 +129,8 @@ fn name(path: &Path) -> String {
 
 #[cfg(test)]
 mod tests {
+    use std::fs::File;
+
     use super::*;
 
     #[test]

@@ -63,7 +63,9 @@ impl Shape {
             Self::Square => (0..size).for_each(|k| put(&[side(k, size), side(k + 1, size)])),
             Self::Star => {
                 let point = |k: u64| {
-                    let wide = if k.is_multiple_of(2) { 100.0 } else { 90.0 };
+                    // Rays are as slender whatever their number, else the triangles of each would grow with it.
+                    let depth = 2.0 * TAU * 100.0 / size as f64;
+                    let wide = if k.is_multiple_of(2) { 100.0 } else { 100.0 - depth };
                     around(k, size, wide)
                 };
                 (0..size).for_each(|k| put(&[point(k), point((k + 1) % size)]));

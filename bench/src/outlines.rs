@@ -5,7 +5,7 @@ use std::fmt::Write;
 
 use crate::space::{Vector, cross, length, minus};
 
-/// What a network looks like.
+/// The form of a network.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Shape {
     /// The outline of fourteen cubic curves, in no plane: the number of curves of the paper on filling holes bounded by B-spline curves.

@@ -247,14 +247,7 @@ impl JobStore for PostgresStore {
     }
 
     fn control(&self, id: JobId, wish: Control) -> Result<Job, StoreError> {
-        let event = match wish {
-            Control::Retry => Event::Retry,
-            Control::Cancel => Event::Cancel,
-            Control::Forget => Event::Forget,
-            Control::Hasten => Event::Hasten,
-            Control::Rank(priority) => Event::Rank(priority),
-            Control::Decide(decision) => Event::Decide(decision),
-        };
+        let event = Event::from(wish);
         let tried = Mutex::new(None);
         self.ask(async |connection| step::transition(connection, id, By::Operator, &tried, |_| Ok(event.clone())).await)
     }

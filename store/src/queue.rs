@@ -323,16 +323,7 @@ impl<T: Tables> JobStore for Queue<T> {
     }
 
     fn control(&self, id: JobId, wish: Control) -> Result<Job, StoreError> {
-        self.transition(id, |_, _| {
-            Ok(match wish {
-                Control::Retry => Event::Retry,
-                Control::Cancel => Event::Cancel,
-                Control::Forget => Event::Forget,
-                Control::Hasten => Event::Hasten,
-                Control::Rank(priority) => Event::Rank(priority),
-                Control::Decide(decision) => Event::Decide(decision),
-            })
-        })
+        self.transition(id, |_, _| Ok(wish.into()))
     }
 
     fn recover(&self, testimony: &dyn Fn(&Job) -> Testimony) -> Result<Vec<Recovered>, StoreError> {

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::path::PathBuf;
 
 use crate::id::{Epoch, JobId, Recipe, Seq, Time, Token};
-use crate::job::{Decision, Illegal, Job, Kind, Past, Priority, Source, Step, Testimony};
+use crate::job::{Decision, Event, Illegal, Job, Kind, Past, Priority, Source, Step, Testimony};
 use crate::news::{News, Notice};
 
 /// As many results alike are named as it makes sense to look at.
@@ -273,6 +273,19 @@ pub enum Control {
     Rank(Priority),
     /// Publish the best attempt of a job that needs review, as it was judged, or say that it is not to be used.
     Decide(Decision),
+}
+
+impl From<Control> for Event {
+    fn from(wish: Control) -> Self {
+        match wish {
+            Control::Retry => Self::Retry,
+            Control::Cancel => Self::Cancel,
+            Control::Forget => Self::Forget,
+            Control::Hasten => Self::Hasten,
+            Control::Rank(priority) => Self::Rank(priority),
+            Control::Decide(decision) => Self::Decide(decision),
+        }
+    }
 }
 
 /// A job whose daemon died.

@@ -1,4 +1,4 @@
-//! What filling a network of curves cost, and how good its triangles are.
+//! The cost of filling a network of curves, and the quality of its triangles.
 
 use serde::{Deserialize, Serialize};
 

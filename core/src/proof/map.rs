@@ -1,6 +1,6 @@
 //! The map of the triangles of one surface onto the other, block by block.
 //!
-//! What it tells of each block does not depend on other blocks; areas are summed up in whole numbers.
+//! Facts of a block do not depend on other blocks; areas are summed up in whole numbers.
 
 use std::sync::atomic::{AtomicI64, Ordering};
 

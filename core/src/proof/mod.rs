@@ -76,7 +76,7 @@ pub(crate) fn prove(pairing: &Pairing<'_>, most: f64, tight: bool) -> (Proved, V
     }
     let covered: Vec<AtomicI64> = (0..pairing.new_faces.len()).map(|_| AtomicI64::new(0)).collect();
     let size = pairing.points.iter().chain(pairing.new_points).flatten().fold(0.0_f32, |m, x| m.max(x.abs()));
-    // What is found is made larger in the end.
+    // Distances that are found are made larger in the end.
     let rounding = f64::from(size) * ROUNDING;
     let most = ((most - rounding) / (1.0 + SHARE)).max(0.0);
     // As vertices are about so far, no bound can be much better; where a bound is wanted, no better one is needed.

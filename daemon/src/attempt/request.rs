@@ -1,4 +1,4 @@
-//! What a worker is asked for a job: files of the attempt's own folder, settings, bounds.
+//! The request of a job to a worker: files of the attempt's own folder, settings, bounds.
 
 use suture_core::report::Task;
 use suture_core::{Limits, Profile};
@@ -17,7 +17,7 @@ pub(crate) const WITNESS: &str = "outlived";
 /// There while the daemon reads a worker's answer.
 pub(crate) const IN_HAND: &str = "in-hand";
 
-/// What a worker is to do for a job.
+/// The request of a job to a worker.
 pub(super) fn request(
     folder: &Folder,
     claim: &Claim,

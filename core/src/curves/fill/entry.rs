@@ -142,14 +142,12 @@ fn evened<'a>(
         let (first, best) = rounds((known, outlines, options), divided, &mut patches, (&limits, &mut work));
         let mut is_any = false;
         for ((patch, (fewest, at)), limit) in patches.iter().zip(best).zip(&mut limits) {
-            // One that has never become better is best before all rounds.
+            // An outline that has never become better is best before all rounds.
             if at < *limit && (patch.flaws() > fewest || (at == 0 && fewest > 0)) {
                 (*limit, is_any) = (at, true);
             }
         }
-        let is_lost = |number: &usize| {
-            first.get(number).is_some_and(|old| patches[*number].flaws() > old.flaws() && !patches[*number].is_filled())
-        };
+        let is_lost = |number: &usize| first.get(number).is_some_and(|old| old.is_filled() && !patches[*number].is_filled());
         let lost: Vec<usize> = (0..outlines.len()).filter(is_lost).collect();
         for number in sharing(outlines, &lost) {
             (limits[number], is_any) = (0, true);

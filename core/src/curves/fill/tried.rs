@@ -28,7 +28,7 @@ pub(super) struct Unfolded {
 pub(super) struct Tried {
     pub(super) plane: OnceLock<Option<Carrier>>,
     pub(super) carriers: OnceLock<Vec<Carrier>>,
-    /// Those that circles and straight lines of the outline fix.
+    /// Carriers that circles and straight lines of the outline fix.
     pub(super) implied: OnceLock<Vec<Carrier>>,
     pub(super) coons: OnceLock<Unfolded>,
 }

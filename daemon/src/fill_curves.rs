@@ -39,12 +39,24 @@ struct Done {
     mesh: Option<CurveMesh>,
 }
 
-/// Fills the curves of a file; with 1 if an outline is left, with 2 if nothing is written.
+impl Done {
+    /// Whether every face has its surface, and the mesh is none that no network of curves can want: one that crosses itself, has edges of more than two triangles, or
+    /// is closed inside out.
+    fn is_sound(&self) -> bool {
+        let is_mesh = self.mesh.as_ref().is_none_or(|mesh| {
+            let verdict = &mesh.report.verdict;
+            verdict.manifold && verdict.free_of_self_intersection != Some(false) && (verdict.oriented || !verdict.closed)
+        });
+        self.left.is_empty() && self.filled.bare.is_empty() && is_mesh
+    }
+}
+
+/// Fills the curves of a file; with 1 if an outline is left or the mesh is not sound, with 2 if nothing is written.
 pub(crate) fn run(args: &FillCurvesArgs) -> Exit {
     match fill(args) {
         Ok(done) => {
             let text = if args.json { format!("{}\n", as_json(args, &done)) } else { as_text(args, &done) };
-            print(text.as_bytes(), if done.left.is_empty() { Exit::Good } else { Exit::NotGood })
+            print(text.as_bytes(), if done.is_sound() { Exit::Good } else { Exit::NotGood })
         }
         Err(line) => {
             complain(&line);
@@ -69,6 +81,7 @@ fn fill(args: &FillCurvesArgs) -> Result<Done, String> {
     how.longest_gap = args.close_gaps.unwrap_or_default();
     let mut options = Options::default();
     (options.tolerance, options.chord, options.size) = (args.tolerance, args.chord, args.edge);
+    options.told = !args.curves_alone;
     options.continuity = if args.tangent { Continuity::Tangent } else { Continuity::Position };
     options.fans = !matches!(kind, Kind::Mesh(_));
     options.threads = args.spend.threads.map(usize::from);
@@ -232,14 +245,25 @@ fn as_text(args: &FillCurvesArgs, done: &Done) -> String {
     for number in left.iter().take(LISTED) {
         lines.push(format!("  left    outline {number}: {}", problem(filled, *number)));
     }
-    if left.len() > LISTED {
-        lines.push(format!("  left    {} more; --json has all of them", left.len() - LISTED));
+    for number in filled.bare.iter().take(LISTED) {
+        lines.push(format!("  left    {}", bare(network, *number)));
+    }
+    if left.len().max(filled.bare.len()) > LISTED {
+        let more = left.len().saturating_sub(LISTED) + filled.bare.len().saturating_sub(LISTED);
+        lines.push(format!("  left    {more} more; --json has all of them"));
     }
     if let Some(mesh) = mesh {
         let verdict = &mesh.report.verdict;
         lines.push(format!("  verdict {}: {}", if verdict.good { "good" } else { "not good" }, verdict.statement));
     }
     lines.iter().map(|line| plain(line) + "\n").collect()
+}
+
+/// A face that no curve bounds, for people.
+fn bare(network: &Network, number: usize) -> String {
+    let Some(face) = network.faces.get(number) else { return String::new() };
+    let surface = if face.surface.is_empty() { "surface" } else { &face.surface };
+    format!("{} {} in line {}: no curve bounds its {surface}", face.entity, face.source.id, face.source.line)
 }
 
 fn problem(filled: &FilledNetwork, number: usize) -> String {
@@ -267,6 +291,7 @@ fn as_json(args: &FillCurvesArgs, done: &Done) -> Value {
             "triangles_below_0_4": json!({ "at_corners_below_15_degrees": report.sharp, "elsewhere": report.poor }),
             "folded": report.is_folded,
             "ambiguous": report.is_ambiguous,
+            "surface_of_the_file": report.is_told,
             "problem": report.problem.as_ref().map(ToString::to_string),
             "left": left.contains(&number),
         })
@@ -279,6 +304,7 @@ fn as_json(args: &FillCurvesArgs, done: &Done) -> Value {
         "unit": network.unit.name,
         "millimetres": network.unit.millimetres,
         "outlines": outlines.collect::<Vec<_>>(),
+        "faces_without_curves": filled.bare.iter().map(|number| bare(network, *number)).collect::<Vec<_>>(),
         "closed_as_holes": mesh.as_ref().map(|mesh| mesh.closed_as_holes.clone()),
         "mesh": mesh.as_ref().map(|mesh| &mesh.report),
     })

@@ -8,6 +8,7 @@
 mod carrier;
 mod collect;
 pub mod curve;
+mod elementary;
 pub mod export;
 pub mod fill;
 mod finding;
@@ -19,6 +20,7 @@ mod read;
 mod step;
 pub mod vector;
 
+pub use elementary::{Elementary, Frame, Told};
 pub use finding::Finding;
 pub(crate) use finding::Findings;
 pub use network::{Face, Network, ReadError, Unit, Use};

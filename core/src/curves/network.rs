@@ -1,6 +1,7 @@
 //! What is read of a file: curves, and faces with the loops that bound them.
 
 use crate::curves::curve::{self, Curve, Source};
+use crate::curves::elementary::Told;
 use crate::curves::finding::Finding;
 use crate::curves::vector::{Affine, Point, is_finite};
 
@@ -33,6 +34,8 @@ pub struct Face {
     pub entity: String,
     /// What its surface is called there: `128`, `PLANE`; empty if unknown.
     pub surface: String,
+    /// Its surface, if that has an equation.
+    pub told: Option<Told>,
     /// Curves around it in their order; empty of a surface that nothing trims, and where a sphere has a pole for a boundary.
     pub outer: Vec<Use>,
     /// Curves around each of its holes.
@@ -75,12 +78,14 @@ impl Network {
     pub fn append(&mut self, other: Self) {
         let factor = other.unit.millimetres / self.unit.millimetres;
         let first = self.curves.len();
+        let map = Affine::scaling(factor);
         let scaled = |curve: Curve| {
-            let shape = if factor == 1.0 { curve.shape } else { curve.shape.transformed(&Affine::scaling(factor)) };
+            let shape = if factor == 1.0 { curve.shape } else { curve.shape.transformed(&map) };
             Curve { shape, vertices: None, ..curve }
         };
         self.curves.extend(other.curves.into_iter().map(scaled));
         let mut faces = other.faces;
+        faces.iter_mut().for_each(|face| face.told = face.told.and_then(|told| told.transformed(&map)));
         for used in faces.iter_mut().flat_map(|face| std::iter::once(&mut face.outer).chain(&mut face.inner)).flatten() {
             used.curve += first;
         }

@@ -145,7 +145,8 @@ impl Affine {
         self.rows.into_iter().all(is_finite) && is_finite(self.shift)
     }
 
-    fn columns(&self) -> [Point; 3] {
+    /// Images of the axes.
+    pub(crate) fn columns(&self) -> [Point; 3] {
         let [[a, b, c], [d, e, f], [g, h, i]] = self.rows;
         [[a, d, g], [b, e, h], [c, f, i]]
     }

@@ -66,7 +66,7 @@ pub(crate) fn write(
     if triangles.is_empty() {
         return Err(Error::Refused {
             path: name.into(),
-            reason: "no outline of its curves could be filled".into(),
+            reason: format!("no outline of its curves could be filled; {}", first_problem(filled)),
             advice: "`suture curves` lists them".into(),
         });
     }
@@ -84,6 +84,14 @@ pub(crate) fn write(
     };
     let report = entry::inspect(output, &profile, limits, progress)?;
     Ok(CurveMesh { report, closed_as_holes, open, too_small })
+}
+
+/// Why the first outline has no surface.
+fn first_problem(filled: &Filled) -> String {
+    let number = filled.reports.iter().position(|report| report.problem.is_some()).unwrap_or_default();
+    let problem = filled.reports.get(number).and_then(|report| report.problem.as_ref());
+    let why = problem.map_or_else(|| "its triangles vanish in single precision".into(), ToString::to_string);
+    format!("outline {number}: {why}")
 }
 
 /// Triangles that close a ring of points as a hole of a mesh, turned as the ring runs.

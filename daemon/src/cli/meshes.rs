@@ -187,6 +187,9 @@ pub(crate) struct FillCurvesArgs {
     /// Fill the loops that the curves form, even if the file says which curves bound its faces
     #[arg(long)]
     pub loops: bool,
+    /// Use no surface of the file, as if it had none [default: its planes, cylinders, cones, spheres and tori are used, no others]
+    #[arg(long)]
+    pub curves_alone: bool,
     /// Close open ends by straight curves, the nearest two first, none longer than this; lengths are in the unit of the file
     #[arg(long, value_name = "LENGTH", value_parser = parse_length)]
     pub close_gaps: Option<f64>,

@@ -1,5 +1,6 @@
 //! Surfaces that carry curves: where the point of two parameters is, and curves in space from curves of parameters.
 
+mod equation;
 mod lift;
 mod tensor;
 #[cfg(test)]

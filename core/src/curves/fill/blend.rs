@@ -9,8 +9,9 @@ use super::layout::{Corner, Layout, Rim, oriented};
 use super::plate::Plate;
 use super::revolved;
 use super::sides::{self, Side};
-use super::space::{self, Frame};
+use super::space;
 use crate::curves::curve::{CurveError, Spline};
+use crate::curves::elementary::Frame;
 use crate::curves::vector::{Point, add, distance, scale, unit};
 
 /// Cubic curves of a loop in its direction, with their lengths, and the cosines between tangents where each begins.

@@ -3,107 +3,10 @@
 //! Axes are those of the outline's circles, or the directions of its straight lines; with an axis, a surface of revolution is a
 //! curve of distances and heights, on which all points of the outline have to be.
 
-use super::space::{self, Frame};
+use super::space;
 use super::strand::Kind;
+use crate::curves::elementary::{Elementary, Frame, round};
 use crate::curves::vector::{Point, cross, distance, norm, scale, sub, unit};
-
-/// A surface of an equation, without bounds.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[non_exhaustive]
-pub enum Carrier {
-    /// `z = 0` of a frame.
-    Plane(Frame),
-    /// Around the z-axis of a frame.
-    Cylinder {
-        /// Its origin is on the axis.
-        frame: Frame,
-        /// Of the circle.
-        radius: f64,
-    },
-    /// Around the z-axis of a frame, its apex the origin, the surface above it.
-    Cone {
-        /// The apex and the axis.
-        frame: Frame,
-        /// Distance from the axis at the height 1.
-        slope: f64,
-    },
-    /// Around a centre, the origin of a frame whose z-axis is the direction of the outline's middle.
-    Sphere {
-        /// The centre.
-        frame: Frame,
-        /// Of the sphere.
-        radius: f64,
-    },
-    /// Around the z-axis of a frame, symmetric to its plane.
-    Torus {
-        /// The centre and the axis.
-        frame: Frame,
-        /// From the axis to the middle of the tube.
-        major: f64,
-        /// Of the tube.
-        minor: f64,
-    },
-}
-
-impl Carrier {
-    /// A word for it.
-    #[must_use]
-    pub fn name(&self) -> &'static str {
-        match self {
-            Self::Plane(_) => "plane",
-            Self::Cylinder { .. } => "cylinder",
-            Self::Cone { .. } => "cone",
-            Self::Sphere { .. } => "sphere",
-            Self::Torus { .. } => "torus",
-        }
-    }
-
-    /// How far a point is from it.
-    #[must_use]
-    pub fn distance(&self, point: Point) -> f64 {
-        match self {
-            Self::Plane(frame) => frame.inside(point)[2].abs(),
-            Self::Cylinder { frame, radius } => (round(frame, point)[0] - radius).abs(),
-            Self::Cone { frame, slope } => {
-                let [wide, high] = round(frame, point);
-                (wide - high * slope).abs() / slope.hypot(1.0)
-            }
-            Self::Sphere { frame, radius } => (distance(point, frame.origin) - radius).abs(),
-            Self::Torus { frame, major, minor } => {
-                let [wide, high] = round(frame, point);
-                ((wide - major).hypot(high) - minor).abs()
-            }
-        }
-    }
-}
-
-impl Carrier {
-    /// A vector across it at a point that is on it; `None` where it has none, as at an apex.
-    pub(super) fn normal(&self, point: Point) -> Option<Point> {
-        let outside = |frame: &Frame, vector: Point| sub(frame.outside(vector), frame.origin);
-        let (Self::Plane(frame)
-        | Self::Cylinder { frame, .. }
-        | Self::Cone { frame, .. }
-        | Self::Sphere { frame, .. }
-        | Self::Torus { frame, .. }) = self;
-        let [x, y, z] = frame.inside(point);
-        let wide = x.hypot(y);
-        let vector = match self {
-            Self::Plane(_) => [0.0, 0.0, 1.0],
-            Self::Cylinder { .. } => [x, y, 0.0],
-            Self::Cone { slope, .. } => [x, y, -slope * wide],
-            Self::Sphere { .. } => [x, y, z],
-            Self::Torus { major, .. } => [x * (1.0 - major / wide), y * (1.0 - major / wide), z],
-        };
-        unit(outside(frame, vector))
-    }
-}
-
-/// Distance from the axis of a frame, and height.
-pub(super) fn round(frame: &Frame, point: Point) -> [f64; 2] {
-    let [x, y, z] = frame.inside(point);
-    [x.hypot(y), z]
-}
 
 /// Axes that are looked at, at most.
 const AXES: usize = 12;
@@ -111,27 +14,27 @@ const AXES: usize = 12;
 const FEW: usize = 1024;
 
 /// The plane of an outline, if all its points are on it.
-pub(super) fn plane(probes: &[Point], tolerance: f64) -> Option<Carrier> {
+pub(super) fn plane(probes: &[Point], tolerance: f64) -> Option<Elementary> {
     let (middle, normal) = space::plane(probes)?;
-    let carrier = Carrier::Plane(Frame::around(middle, normal));
+    let carrier = Elementary::Plane(Frame::around(middle, normal));
     probes.iter().all(|point| carrier.distance(*point) <= tolerance).then_some(carrier)
 }
 
 /// Surfaces that all points of an outline are on, in the order of preference: cylinder, cone, sphere, torus. O(points · axes).
-pub(super) fn recognise(kinds: &[Kind], probes: &[Point], tolerance: f64) -> Vec<Carrier> {
+pub(super) fn recognise(kinds: &[Kind], probes: &[Point], tolerance: f64) -> Vec<Elementary> {
     let axes = axes(kinds, probes, tolerance);
     let few: Vec<Point> = probes.iter().step_by(probes.len().div_ceil(FEW).max(1)).copied().collect();
     // A surface within the tolerance of `n` points has a sum of squared distances of no more than n · tolerance², and the one of least
     // squares has no larger one; so no point is farther from that than tolerance · √n. Spheres and tori are fitted by the algebraic
     // distance, of which this is true but for terms of the second order.
     let most = tolerance * (few.len() as f64).sqrt();
-    let fitted = |fit: &dyn Fn(&[Point]) -> Option<Carrier>| -> Option<Carrier> {
+    let fitted = |fit: &dyn Fn(&[Point]) -> Option<Elementary>| -> Option<Elementary> {
         let rough = fit(&few)?;
         (few.len() == probes.len())
             .then_some(rough)
             .or_else(|| few.iter().all(|point| rough.distance(*point) <= most).then(|| fit(probes))?)
     };
-    let mut found: Vec<Carrier> = Vec::new();
+    let mut found: Vec<Elementary> = Vec::new();
     found.extend(axes.iter().filter_map(|axis| fitted(&|points| cylinder(axis, points))));
     found.extend(parallel(kinds, probes, tolerance));
     found.extend(axes.iter().filter_map(|axis| fitted(&|points| cone(axis, points))));
@@ -143,24 +46,24 @@ pub(super) fn recognise(kinds: &[Kind], probes: &[Point], tolerance: f64) -> Vec
 
 /// How far other curves of an outline may be from a surface that its circles and straight lines fix, in sizes: CAD programs write curves in
 /// which surfaces meet as splines that are near them, to some 10⁻⁴.
-const NEAR: f64 = 2e-4;
+pub(super) const NEAR: f64 = 2e-4;
 
 /// Surfaces that circles and straight lines of an outline fix, and to which its other curves are near, the nearest first. `exact` are
 /// points of the first, `kinds` are theirs, and `probes` are points of all curves. O(points · axes).
-pub(super) fn implied(kinds: &[Kind], exact: &[Point], probes: &[Point], tolerance: f64) -> Vec<Carrier> {
+pub(super) fn implied(kinds: &[Kind], exact: &[Point], probes: &[Point], tolerance: f64) -> Vec<Elementary> {
     let size = space::size(probes);
     // Circles in one plane fix nothing.
     if exact.len() == probes.len() || space::size(exact) < 0.1 * size || plane(exact, 0.01 * size).is_some() {
         return Vec::new();
     }
     let near = recognise(kinds, exact, tolerance).into_iter().map(|carrier| (farthest(&carrier, probes), carrier));
-    let mut near: Vec<(f64, Carrier)> = near.filter(|(far, _)| *far <= NEAR * size).collect();
+    let mut near: Vec<(f64, Elementary)> = near.filter(|(far, _)| *far <= NEAR * size).collect();
     near.sort_by(|(a, _), (b, _)| a.total_cmp(b));
     near.into_iter().map(|(_, carrier)| carrier).collect()
 }
 
 /// The largest distance of points.
-pub(super) fn farthest(carrier: &Carrier, probes: &[Point]) -> f64 {
+pub(super) fn farthest(carrier: &Elementary, probes: &[Point]) -> f64 {
     probes.iter().fold(0.0_f64, |most, point| most.max(carrier.distance(*point)))
 }
 
@@ -185,14 +88,14 @@ fn axes(kinds: &[Kind], probes: &[Point], tolerance: f64) -> Vec<Frame> {
     axes
 }
 
-fn cylinder(axis: &Frame, probes: &[Point]) -> Option<Carrier> {
+fn cylinder(axis: &Frame, probes: &[Point]) -> Option<Elementary> {
     let sum: f64 = probes.iter().map(|point| round(axis, *point)[0]).sum();
     let radius = sum / probes.len().max(1) as f64;
-    (radius > 0.0).then_some(Carrier::Cylinder { frame: *axis, radius })
+    (radius > 0.0).then_some(Elementary::Cylinder { frame: *axis, radius })
 }
 
 /// A cylinder along straight lines.
-fn parallel(kinds: &[Kind], probes: &[Point], tolerance: f64) -> Option<Carrier> {
+fn parallel(kinds: &[Kind], probes: &[Point], tolerance: f64) -> Option<Elementary> {
     let mut lines = kinds.iter().filter_map(|kind| if let Kind::Straight(along) = kind { Some(*along) } else { None });
     let along = lines.next()?;
     let second = lines.next()?;
@@ -206,11 +109,11 @@ fn parallel(kinds: &[Kind], probes: &[Point], tolerance: f64) -> Option<Carrier>
     // Of a flatter arc, the radius would be a guess.
     let is_bent = size * size > 40.0 * tolerance * radius;
     let origin = frame.outside([centre[0], centre[1], 0.0]);
-    is_bent.then_some(Carrier::Cylinder { frame: Frame { origin, ..frame }, radius })
+    is_bent.then_some(Elementary::Cylinder { frame: Frame { origin, ..frame }, radius })
 }
 
 /// The line of least squares through distances and heights, by its angle.
-fn cone(axis: &Frame, probes: &[Point]) -> Option<Carrier> {
+fn cone(axis: &Frame, probes: &[Point]) -> Option<Elementary> {
     let flat: Vec<[f64; 2]> = probes.iter().map(|point| round(axis, *point)).collect();
     let count = flat.len().max(1) as f64;
     let [a, b] = flat.iter().fold([0.0; 2], |[a, b], [x, y]| [a + x / count, b + y / count]);
@@ -227,19 +130,19 @@ fn cone(axis: &Frame, probes: &[Point]) -> Option<Carrier> {
     let [x, y, z] = axis.axes;
     // The surface above the apex.
     let axes = if slope > 0.0 { [x, y, z] } else { [x, scale(y, -1.0), scale(z, -1.0)] };
-    Some(Carrier::Cone { frame: Frame { origin: apex, axes }, slope: slope.abs() })
+    Some(Elementary::Cone { frame: Frame { origin: apex, axes }, slope: slope.abs() })
 }
 
-fn sphere(probes: &[Point]) -> Option<Carrier> {
+fn sphere(probes: &[Point]) -> Option<Elementary> {
     let (centre, radius) = space::sphere(probes)?;
     let towards = unit(sub(space::mean(probes), centre))?;
-    Some(Carrier::Sphere { frame: Frame::around(centre, towards), radius })
+    Some(Elementary::Sphere { frame: Frame::around(centre, towards), radius })
 }
 
-fn torus(axis: &Frame, probes: &[Point]) -> Option<Carrier> {
+fn torus(axis: &Frame, probes: &[Point]) -> Option<Elementary> {
     let flat: Vec<[f64; 2]> = probes.iter().map(|point| round(axis, *point)).collect();
     let ([major, height], minor) = space::circle(&flat)?;
     let origin = axis.outside([0.0, 0.0, height]);
     // Tubes that reach the axis are apples and lemons, which outlines do not tell apart.
-    (major > minor).then_some(Carrier::Torus { frame: Frame { origin, ..*axis }, major, minor })
+    (major > minor).then_some(Elementary::Torus { frame: Frame { origin, ..*axis }, major, minor })
 }

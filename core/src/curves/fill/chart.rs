@@ -2,12 +2,12 @@
 
 use std::f64::consts::TAU;
 
-use super::carrier::Carrier;
 use super::coons::Coons;
 use super::fan::Fan;
 use super::plate::Plate;
-use super::space::Frame;
 use crate::curves::curve::Spline;
+use crate::curves::elementary::Elementary;
+use crate::curves::elementary::Frame;
 use crate::curves::vector::{Point, add, between, dot, norm, scale};
 
 /// A flat map of a surface.
@@ -153,13 +153,13 @@ fn opened(major: f64, minor: f64, height: f64) -> f64 {
 
 impl Chart {
     /// The chart of a carrier.
-    pub(super) fn of(carrier: &Carrier) -> Self {
+    pub(super) fn of(carrier: &Elementary) -> Self {
         match *carrier {
-            Carrier::Plane(frame) => Self::Plane(frame),
-            Carrier::Sphere { frame, radius } => Self::Sphere(frame, radius),
-            Carrier::Cylinder { frame, radius } => Self::Turned(Turned::Cylinder(frame, radius)),
-            Carrier::Cone { frame, slope } => Self::Turned(Turned::Cone(frame, slope.atan())),
-            Carrier::Torus { frame, major, minor } => Self::Turned(Turned::Torus(frame, major, minor)),
+            Elementary::Plane(frame) => Self::Plane(frame),
+            Elementary::Sphere { frame, radius } => Self::Sphere(frame, radius),
+            Elementary::Cylinder { frame, radius } => Self::Turned(Turned::Cylinder(frame, radius)),
+            Elementary::Cone { frame, slope } => Self::Turned(Turned::Cone(frame, slope.atan())),
+            Elementary::Torus { frame, major, minor } => Self::Turned(Turned::Torus(frame, major, minor)),
         }
     }
 
@@ -260,11 +260,11 @@ mod tests {
     fn charts_are_inverted() {
         let frame = Frame::around([1.0, 2.0, 3.0], [0.6, 0.0, 0.8]);
         for carrier in [
-            Carrier::Plane(frame),
-            Carrier::Sphere { frame, radius: 2.0 },
-            Carrier::Cylinder { frame, radius: 2.0 },
-            Carrier::Cone { frame, slope: 0.7 },
-            Carrier::Torus { frame, major: 5.0, minor: 2.0 },
+            Elementary::Plane(frame),
+            Elementary::Sphere { frame, radius: 2.0 },
+            Elementary::Cylinder { frame, radius: 2.0 },
+            Elementary::Cone { frame, slope: 0.7 },
+            Elementary::Torus { frame, major: 5.0, minor: 2.0 },
         ] {
             let chart = Chart::of(&carrier);
             for place in [[0.3, 0.4], [1.0, -0.7], [2.0, 1.5]] {
@@ -287,7 +287,7 @@ mod tests {
     /// In the map of a torus, a small step around and a small step in the tube have the same scale.
     #[test]
     fn the_map_of_a_torus_keeps_angles() {
-        let chart = Chart::of(&Carrier::Torus { frame: Frame::around([0.0; 3], [0.0, 0.0, 1.0]), major: 3.0, minor: 2.5 });
+        let chart = Chart::of(&Elementary::Torus { frame: Frame::around([0.0; 3], [0.0, 0.0, 1.0]), major: 3.0, minor: 2.5 });
         for place in [[0.0, 0.0], [1.0, 4.0], [2.0, -20.0]] {
             let step = |x: f64, y: f64| distance(chart.point(place), chart.point([place[0] + x, place[1] + y]));
             assert!((step(1e-5, 0.0) / step(0.0, 1e-5) - 1.0).abs() < 1e-4);

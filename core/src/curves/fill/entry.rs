@@ -17,6 +17,7 @@ use super::strand::Strand;
 use super::tangent::{self, Beside};
 use super::tried::Tried;
 use crate::curves::curve::{Shape, Spline};
+use crate::curves::elementary::Told;
 use crate::curves::vector::Point;
 
 /// Edges of curves may be longer than those within by this factor.
@@ -93,13 +94,29 @@ pub fn fill_beside(
     beside: &[Beside<'_>],
     options: &Options,
 ) -> Result<Filled, FillError> {
-    options.with_threads(|| made(shapes, outlines, beside, options))
+    options.with_threads(|| made(shapes, (outlines, &[]), beside, options))
+}
+
+/// As [`fill`], with the surfaces that a file says for its outlines, and the threads that there are.
+pub(super) fn fill_told(
+    shapes: &[&Shape],
+    outlines: (&[Outline], &[Option<Told>]),
+    options: &Options,
+) -> Result<Filled, FillError> {
+    made(shapes, outlines, &[], options)
 }
 
 /// Fills outlines with the threads that there are.
-fn made(shapes: &[&Shape], outlines: &[Outline], beside: &[Beside<'_>], options: &Options) -> Result<Filled, FillError> {
+fn made(
+    shapes: &[&Shape],
+    (outlines, told): (&[Outline], &[Option<Told>]),
+    beside: &[Beside<'_>],
+    options: &Options,
+) -> Result<Filled, FillError> {
     let strands = strands(shapes, outlines)?;
-    let tried: Vec<Tried> = outlines.iter().map(|_| Tried::default()).collect();
+    let tried: Vec<Tried> = (0..outlines.len())
+        .map(|number| Tried { told: told.get(number).copied().flatten().filter(|_| options.told), ..Tried::default() })
+        .collect();
     let mut divided = network::divide(&strands, outlines, options, &[]);
     if options.size.is_none() {
         // Curves are divided as finely as their surfaces have to be, else triangles between both would be flat.

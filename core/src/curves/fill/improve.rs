@@ -241,9 +241,9 @@ impl<'a> Improved<'a> {
 #[cfg(test)]
 mod tests {
     use super::super::chart::Chart;
-    use super::super::space::Frame;
     use super::super::triangles::Flat;
     use super::*;
+    use crate::curves::elementary::Frame;
 
     #[test]
     fn an_even_triangle_is_1_and_a_flat_one_0() {

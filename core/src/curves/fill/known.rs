@@ -5,6 +5,7 @@ use std::f64::consts::TAU;
 use super::*;
 use crate::curves::Use;
 use crate::curves::curve::{Arc, Shape, Spline};
+use crate::curves::elementary::Elementary;
 use crate::curves::vector::{Point, add, cross, distance, dot, scale, sub, unit};
 
 const SCALES: [f64; 3] = [1e-3, 1.0, 1e4];
@@ -116,7 +117,11 @@ fn outlines_of_arcs_on_a_sphere_are_exact() {
             if is_spline { Shape::Spline(arc.to_spline().unwrap()) } else { arc }
         };
         let result = run(&(0..sides).map(side).collect::<Vec<_>>(), &Options::default());
-        assert!(matches!(result.surfaces[0], Surface::Carrier(Carrier::Sphere { .. })), "{sides} sides: {:?}", result.reports[0]);
+        assert!(
+            matches!(result.surfaces[0], Surface::Carrier(Elementary::Sphere { .. })),
+            "{sides} sides: {:?}",
+            result.reports[0]
+        );
         assert!(result.mesh.points.iter().all(|p| (distance(*p, centre) - size).abs() <= 1e-6 * size));
         assert!(is_coherent(&result.mesh));
     }
@@ -214,7 +219,7 @@ fn cones_are_as_near_as_is_asked_for() {
         };
         for side in [1.0, -1.0] {
             let result = run(&half(side), &Options { chord: Some(chord), ..Options::default() });
-            assert!(matches!(result.surfaces[0], Surface::Carrier(Carrier::Cone { .. })), "{:?}", result.reports[0]);
+            assert!(matches!(result.surfaces[0], Surface::Carrier(Elementary::Cone { .. })), "{:?}", result.reports[0]);
             let at = |number: u32| result.mesh.points[number as usize];
             let middles = result.mesh.triangles.iter().flat_map(|&[a, b, c]| {
                 let [p, q, r] = [a, b, c].map(at);

@@ -14,6 +14,7 @@ mod chart;
 mod chords;
 mod coons;
 mod entry;
+mod faces;
 mod fan;
 mod fans;
 mod fit;
@@ -39,6 +40,7 @@ mod refine;
 mod report;
 mod revolved;
 mod sense;
+mod side;
 mod sided;
 mod sides;
 mod space;
@@ -49,19 +51,20 @@ mod sum;
 mod tangent;
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod told;
 mod triangles;
 mod tried;
+mod unrolled;
 mod weights;
 
 pub use all::{FilledNetwork, fill_network};
 pub use body::body;
-pub use carrier::Carrier;
 pub use coons::{Base, Coons};
 pub use entry::{FillError, Filled, fill, fill_beside};
 pub use fit::{FitError, Fitted, fit};
 pub use mesh::{Mesh, quality};
 pub use options::{Continuity, Options, Outline};
 pub use report::{Method, Problem, Report, Surface};
-pub use space::Frame;
 pub use spline::{Jet, SplineSurface};
 pub use tangent::Beside;

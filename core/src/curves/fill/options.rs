@@ -20,6 +20,9 @@ pub struct Options {
     pub carrier: Option<f64>,
     /// Whether such surfaces are looked for, planes apart, which always are.
     pub recognises: bool,
+    /// Whether a plane, cylinder, cone, sphere or torus that a file says for a face is taken for its surface, if its curves are within 2 · 10⁻⁴ of the size of
+    /// it. Without, curves alone count, as if the file had no surfaces.
+    pub told: bool,
     /// Curves are joined into one side where the cosine between their tangents is above this.
     pub smooth: f64,
     /// How far edges of the mesh may be from curves and surfaces; `None`: 2 · 10⁻³ of the size of each outline.
@@ -58,6 +61,7 @@ impl Default for Options {
             tolerance: None,
             carrier: None,
             recognises: true,
+            told: true,
             smooth: 0.9,
             chord: None,
             angle: 0.35,

@@ -1,24 +1,27 @@
 //! The surface and the mesh of one outline: methods tried in their order of trust.
 
 use super::blend::{self, Curves};
-use super::carrier::{self, Carrier};
+use super::carrier;
 use super::chords::{self, Chord};
 use super::fans;
 use super::fit::FitError;
 use super::improve::Improved;
-use super::layout::{self, Corner, Layout, Rim, Wish};
+use super::layout::{Corner, Layout, Rim, Wish};
 use super::lifted::Lifted;
 use super::options::{Options, Outline};
 use super::poor::{self, Angles, Split};
 use super::refine;
 use super::report::{Method, Problem, Report, Surface};
+use super::side;
 use super::sides;
 use super::space;
 use super::star;
 use super::strand::{Kind, Strand};
 use super::triangles;
 use super::tried::Tried;
+use super::unrolled;
 use crate::curves::Use;
+use crate::curves::elementary::Elementary;
 use crate::curves::vector::{Point, distance, dot, scale};
 
 /// Gaps between curves count as inaccuracy of these up to this share of the size.
@@ -123,6 +126,8 @@ impl<'a> Task<'a> {
             tangent: 0,
             kink: 0.0,
             is_folded: false,
+            is_told: false,
+            is_left: None,
             is_ambiguous: self.is_ambiguous(),
             is_flipped: false,
             sharp: 0,
@@ -142,7 +147,12 @@ impl<'a> Task<'a> {
         let found = found.or_else(|| self.blended(cosines, (&probes, tolerance), &mut report));
         match found {
             Some((surface, meshed)) => self.patch(surface, report, meshed),
-            None => self.fallback(report),
+            None => {
+                if self.tried.plane.get().is_some_and(Option::is_some) {
+                    report.problem = Some(Problem::Crosses);
+                }
+                self.fallback(report)
+            }
         }
     }
 
@@ -159,6 +169,9 @@ impl<'a> Task<'a> {
     }
 
     fn carrier(&self, probes: &[Point], tolerance: f64, report: &mut Report) -> Option<(Surface, Meshed)> {
+        if let Some(found) = self.told(probes, tolerance, report) {
+            return Some(found);
+        }
         let plane = self.tried.plane.get_or_init(|| carrier::plane(probes, tolerance));
         if let Some(found) = plane.and_then(|plane| self.carried(plane, Method::Plane, (probes, tolerance), report)) {
             return Some(found);
@@ -171,6 +184,22 @@ impl<'a> Task<'a> {
             carrier::recognise(&kinds, probes, tolerance)
         });
         carriers.iter().find_map(|carrier| self.carried(*carrier, Method::Recognised, (probes, tolerance), report))
+    }
+
+    /// The surface that the file says, if the curves are near it.
+    fn told(&self, probes: &[Point], tolerance: f64, report: &mut Report) -> Option<(Surface, Meshed)> {
+        let told = self.tried.told?;
+        let far = carrier::farthest(&told.surface, probes);
+        if far > tolerance.max(carrier::NEAR * report.size) {
+            return None;
+        }
+        let surface = side::facing(told, self.rings)?;
+        let layout = unrolled::on_carrier(&surface, (self.rings, told.is_left), tolerance.max(far))?;
+        let meshed = self.mesh(layout)?;
+        report.method = if matches!(surface, Elementary::Plane(_)) { Method::Plane } else { Method::Recognised };
+        (report.error, report.is_told, report.is_left) = (far, true, told.is_left);
+        report.is_ambiguous &= told.is_left.is_none() && !matches!(surface, Elementary::Plane(_));
+        Some((Surface::Carrier(surface), meshed))
     }
 
     /// A surface that circles and straight lines fix, where the other curves are near it alone; none where it was said how near they
@@ -194,12 +223,12 @@ impl<'a> Task<'a> {
     /// The outline on a carrier, if it can be laid flat there.
     fn carried(
         &self,
-        carrier: Carrier,
+        carrier: Elementary,
         method: Method,
         (probes, tolerance): (&[Point], f64),
         report: &mut Report,
     ) -> Option<(Surface, Meshed)> {
-        let layout = layout::on_carrier(&carrier, self.rings, tolerance)?;
+        let layout = unrolled::on_carrier(&carrier, (self.rings, None), tolerance)?;
         let meshed = self.mesh(layout)?;
         report.method = method;
         report.error = carrier::farthest(&carrier, probes);

@@ -1,10 +1,10 @@
 //! What became of outlines.
 
-use super::carrier::Carrier;
 use super::coons::Coons;
 use super::fit::FitError;
-use super::space::Frame;
 use crate::curves::curve::Spline;
+use crate::curves::elementary::Elementary;
+use crate::curves::elementary::Frame;
 use crate::curves::vector::Point;
 
 /// How an outline was filled.
@@ -36,7 +36,7 @@ pub enum Method {
 #[non_exhaustive]
 pub enum Surface {
     /// Trimmed by the outline.
-    Carrier(Carrier),
+    Carrier(Elementary),
     /// Whole.
     Coons(Box<Coons>),
     /// The mesh alone has it: heights over the x-y-plane of a frame.
@@ -77,6 +77,9 @@ pub enum Problem {
     /// All surfaces that were tried fold, and no plane shows the outline without crossings.
     #[error("every surface folds")]
     Folds,
+    /// Its curves are in one plane, and cross there.
+    #[error("its curves cross each other, or themselves, in their plane")]
+    Crosses,
     /// Holes are filled in planes and on cylinders, cones, spheres and tori alone.
     #[error("holes in a surface that is no plane, cylinder, cone, sphere or torus")]
     Holes,
@@ -106,6 +109,10 @@ pub struct Report {
     pub kink: f64,
     /// Whether a Coons surface of it folds.
     pub is_folded: bool,
+    /// Whether its file said its surface.
+    pub is_told: bool,
+    /// Whether the surface is to the left of its outline as seen from outside; `None` where the file did not say it.
+    pub is_left: Option<bool>,
     /// Whether other simple surfaces have the same outline: its curve is a circle, or its curves are two circles around one axis.
     pub is_ambiguous: bool,
     /// Whether triangles run against the direction of the outline, so that they agree with those of other outlines.

@@ -5,9 +5,9 @@
 //! profile's point by that of its beginning. The product of two B-splines is one, so nothing is approximated.
 
 use super::coons::Coons;
-use super::space::Frame;
 use super::spline::SplineSurface;
 use crate::curves::curve::{CurveError, Spline};
+use crate::curves::elementary::Frame;
 use crate::curves::vector::{Point, add, cross, distance, dot, norm, scale, sub, unit};
 
 /// Samples of a side.

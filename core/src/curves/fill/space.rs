@@ -5,40 +5,6 @@ use crate::curves::curve::widen;
 use crate::curves::vector::{Point, add, cross, distance, dot, norm, scale, sub, unit};
 use crate::util::linear::solve;
 
-/// An origin and three axes, each of length 1 and perpendicular to the others, right-handed.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Frame {
-    /// The origin.
-    pub origin: Point,
-    /// Axes x, y and z.
-    pub axes: [Point; 3],
-}
-
-impl Frame {
-    /// A frame with this direction (of length 1) for its z-axis.
-    pub(super) fn around(origin: Point, z: Point) -> Self {
-        let mut least = [0.0; 3];
-        let smallest = z.iter().enumerate().min_by(|a, b| a.1.abs().total_cmp(&b.1.abs())).map_or(0, |(at, _)| at);
-        least.iter_mut().skip(smallest).take(1).for_each(|x| *x = 1.0);
-        let x = unit(cross(least, z)).unwrap_or([1.0, 0.0, 0.0]);
-        Self { origin, axes: [x, cross(z, x), z] }
-    }
-
-    /// Coordinates in this frame.
-    #[must_use]
-    pub fn inside(&self, point: Point) -> Point {
-        let offset = sub(point, self.origin);
-        self.axes.map(|axis| dot(offset, axis))
-    }
-
-    /// The point of coordinates in this frame.
-    #[must_use]
-    pub fn outside(&self, [x, y, z]: Point) -> Point {
-        let [a, b, c] = self.axes;
-        add(self.origin, add(add(scale(a, x), scale(b, y)), scale(c, z)))
-    }
-}
-
 pub(super) fn mean(points: &[Point]) -> Point {
     scale(points.iter().fold([0.0; 3], |sum, point| add(sum, *point)), 1.0 / points.len().max(1) as f64)
 }

@@ -6,6 +6,7 @@ use super::fit::{self, FitError};
 use super::pieces::Pieces;
 use super::space;
 use crate::curves::curve::{Shape, Spline};
+use crate::curves::elementary::Frame;
 use crate::curves::vector::{Point, cross, distance, dot, norm, sub, unit};
 
 /// What a curve is.
@@ -182,7 +183,7 @@ fn kind(shape: &Shape, probes: &[Point], tolerance: f64) -> Kind {
 
 fn round(probes: &[Point], tolerance: f64) -> Option<Kind> {
     let (middle, axis) = space::plane(probes)?;
-    let frame = space::Frame::around(middle, axis);
+    let frame = Frame::around(middle, axis);
     let inside: Vec<Point> = probes.iter().map(|point| frame.inside(*point)).collect();
     if inside.iter().any(|[.., z]| z.abs() > tolerance) {
         return None;

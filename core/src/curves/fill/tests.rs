@@ -3,6 +3,7 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 use super::*;
 use crate::curves::Use;
 use crate::curves::curve::{Arc, Shape, Spline};
+use crate::curves::elementary::Elementary;
 use crate::curves::vector::{Point, cross, distance, dot, scale, sub};
 
 fn line(a: Point, b: Point) -> Shape {
@@ -273,7 +274,7 @@ fn circles_fix_the_surface_of_curves_that_are_near() {
         filled(&shapes, &[outline([1, 2, 3])], &Options::default())
     };
     let near = filled_with(4.0 / 3.0 * (2.0_f64.sqrt() - 1.0));
-    let Surface::Carrier(Carrier::Sphere { radius, frame }) = near.surfaces[0] else { panic!("{:?}", near.reports) };
+    let Surface::Carrier(Elementary::Sphere { radius, frame }) = near.surfaces[0] else { panic!("{:?}", near.reports) };
     assert!((radius - 1.0).abs() < 1e-9 && distance(frame.origin, [0.0; 3]) < 1e-9);
     assert!((2e-4..2.8e-4).contains(&near.reports[0].error), "{}", near.reports[0].error);
     assert!(off(&near, |point| distance(point, [0.0; 3]) - 1.0) < 2.8e-4);

@@ -2,8 +2,8 @@
 
 use std::sync::OnceLock;
 
-use super::carrier::Carrier;
 use super::coons::Coons;
+use crate::curves::elementary::{Elementary, Told};
 
 /// A Coons surface.
 #[derive(Debug)]
@@ -26,9 +26,11 @@ pub(super) struct Unfolded {
 /// Surfaces of an outline that do not depend on how its curves are divided, made when they are first asked for.
 #[derive(Debug, Default)]
 pub(super) struct Tried {
-    pub(super) plane: OnceLock<Option<Carrier>>,
-    pub(super) carriers: OnceLock<Vec<Carrier>>,
+    /// The one that the outline's file says.
+    pub(super) told: Option<Told>,
+    pub(super) plane: OnceLock<Option<Elementary>>,
+    pub(super) carriers: OnceLock<Vec<Elementary>>,
     /// Carriers that circles and straight lines of the outline fix.
-    pub(super) implied: OnceLock<Vec<Carrier>>,
+    pub(super) implied: OnceLock<Vec<Elementary>>,
     pub(super) coons: OnceLock<Unfolded>,
 }

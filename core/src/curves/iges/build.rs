@@ -151,6 +151,7 @@ impl<'a> Builder<'a> {
                     source: Source { id: Id::Directory(entry.number.into()), line: entry.line },
                     entity: entry.kind.to_string(),
                     surface: entry.kind.to_string(),
+                    told: None,
                     outer: Vec::new(),
                     inner: Vec::new(),
                     is_untrimmed: true,

@@ -70,9 +70,10 @@ impl Builder<'_> {
         }
         let outer = if outline.has_outer && !loops.is_empty() { loops.remove(0) } else { Vec::new() };
         let surface = self.directory.get(outline.surface).map(|surface| surface.kind.to_string()).unwrap_or_default();
+        let told = self.told(outline.surface, place);
         let source = Source { id: Id::Directory(entry.number.into()), line: entry.line };
         let is_untrimmed = !outline.has_outer;
-        self.faces.push(Face { source, entity: entry.kind.to_string(), surface, outer, inner: loops, is_untrimmed });
+        self.faces.push(Face { source, entity: entry.kind.to_string(), surface, told, outer, inner: loops, is_untrimmed });
     }
 
     /// 142: the curve in space, if there is one.

@@ -6,6 +6,7 @@ use super::parameters::Parameters;
 use super::places::Place;
 use crate::curves::carrier::{Carrier, Tensor};
 use crate::curves::curve::{Curve, Id, Role, Shape, Source};
+use crate::curves::elementary::Told;
 use crate::curves::network::Use;
 use crate::curves::vector::{Affine, Point, cross, sub, unit};
 
@@ -79,6 +80,18 @@ impl Builder<'_> {
         let Some(parameters) = self.parameters(&entry) else { return };
         let count = parameters.count(1, 2, 1).unwrap_or(0);
         (2..2 + count).filter_map(|at| parameters.pointer(at).ok()).for_each(|part| self.mark(part, depth + 1));
+    }
+
+    /// The surface of a face, if it is one of revolution (120) that has an equation. On which side of their boundary faces are, IGES says for those of solids
+    /// alone, and programs do not keep to it.
+    pub(super) fn told(&mut self, number: u32, place: Place) -> Option<Told> {
+        if self.directory.get(number)?.kind != 120 {
+            return None;
+        }
+        let carried = self.carried(number).ok()?;
+        let map = self.places.map(place).after(&carried.map);
+        let told = carried.carrier.told(true)?.transformed(&map)?;
+        Some(Told { is_left: None, ..told })
     }
 
     fn carried(&mut self, number: u32) -> Result<Carried, String> {

@@ -18,7 +18,7 @@ use super::graph::{Star, append, contracted, in_cycles};
 use super::rotation;
 use crate::curves::curve::Shape;
 use crate::curves::network::Use;
-use crate::curves::vector::{Point, add, cross, dot, norm, scale, sub, unit};
+use crate::curves::vector::{Point, add, cross, norm, scale, sub, unit};
 
 /// Edges that a search looks at, and cycles that it gives, at most.
 const MOST_STEPS: usize = 192;
@@ -150,14 +150,14 @@ impl Cells<'_, '_> {
         for (edge, sign) in edges.iter().zip(&mut turns.signs) {
             let [from, to] = edge.nodes.map(|node| normals.get(node as usize).copied().flatten());
             let moved = from.and_then(|normal| self.moved(edge, normal));
-            let cosine = moved.zip(to).map_or(0.0, |(moved, normal)| dot(moved, normal));
+            let cosine = moved.zip(to).map_or(0.0, |((moved, along), normal)| rotation::cosine_about(along, moved, normal));
             *sign = if cosine.abs() < 0.2 { 0 } else { cosine.signum() as i8 };
         }
         turns
     }
 
-    /// A normal at the beginning of an edge, moved along it without a twist.
-    fn moved(&self, edge: &Edge, normal: Point) -> Option<Point> {
+    /// A normal at the beginning of an edge, moved along it without a twist, and the direction in which the edge ends.
+    fn moved(&self, edge: &Edge, normal: Point) -> Option<(Point, Point)> {
         let mut normal = normal;
         let mut last: Option<Point> = None;
         for part in &edge.parts {
@@ -182,7 +182,7 @@ impl Cells<'_, '_> {
                 }
             }
         }
-        Some(normal)
+        last.map(|last| (normal, last))
     }
 
     /// The direction in which an edge leaves its end, and where it is a little later.

@@ -81,6 +81,14 @@ pub(super) fn transported(vector: Point, from: Point, to: Point) -> Option<Point
     (cosine > -0.999).then(|| add(sub(vector, scale(sum, dot(sum, vector) / (1.0 + cosine))), scale(to, 2.0 * dot(from, vector))))
 }
 
+/// The cosine of the angle between two vectors as seen along a direction; 0 where one of them has nearly that direction. Corners that are sharp have normals
+/// that lean along their edges: only what is across an edge tells its sides.
+pub(super) fn cosine_about(along: Point, a: Point, b: Point) -> f64 {
+    let across = |vector: Point| sub(vector, scale(along, dot(vector, along)));
+    let (a, b) = (across(a), across(b));
+    if norm(a).min(norm(b)) < 0.1 { 0.0 } else { dot(a, b) / (norm(a) * norm(b)) }
+}
+
 /// The direction in which vectors differ least: of the smallest eigenvalue of the sum of their squares, by Jacobi's rotations. Nothing if the
 /// next eigenvalue is not well above it, and well above nothing.
 fn normal(vectors: impl Iterator<Item = Point>) -> Option<Point> {

@@ -127,6 +127,33 @@ fn a_box_has_six_faces() {
     }
 }
 
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(200))]
+
+    /// Edges of a tetrahedron, of a pyramid over a polygon and of two of them, whose corners are anywhere: their faces are found, however sharp corners are.
+    #[test]
+    fn pyramids_have_their_faces(sides in 3_usize..8, is_double: bool, top in (-1.0..1.0_f64, -1.0..1.0_f64, 0.3..4.0_f64)) {
+        // The base of a flat pyramid goes around all its other faces, and that of two slender ones is shorter than these: whether it is a face, nobody knows.
+        let top = (0.2 * top.0, 0.2 * top.1, if is_double { 0.2 + 0.15 * top.2 } else { 2.5 + top.2 });
+        let corner = |k: usize| {
+            let (sin, cos) = (std::f64::consts::TAU * (k % sides) as f64 / sides as f64).sin_cos();
+            [cos, sin, 0.0]
+        };
+        let (x, y, z) = top;
+        let mut edges: Vec<[Point; 2]> = (0..sides).flat_map(|k| [[corner(k), corner(k + 1)], [corner(k), [x, y, z]]]).collect();
+        if is_double {
+            edges.extend((0..sides).map(|k| [corner(k), [y, x, -z]]));
+        }
+        let network = lines(&edges);
+        let loops = find(&network, &Options::default());
+        check(&network, &loops);
+        check_sides(&loops);
+        let mut expected = vec![3; if is_double { 2 * sides } else { sides }];
+        expected.extend((!is_double).then_some(sides));
+        prop_assert_eq!(sizes(&loops), expected);
+    }
+}
+
 /// A tube of long narrow fields, open at both ends: rings around it are no faces, but those at its ends may be.
 #[test]
 fn rings_around_a_tube_are_no_faces() {

@@ -3,10 +3,15 @@
 use super::builder::{Builder, Place};
 use super::curves::directed;
 use crate::curves::curve::{Id, Shape, Source};
+use crate::curves::elementary::Told;
 use crate::curves::network::{Face, Use};
 
 /// Entities that are faces with bounds.
 pub(super) const FACES: [&str; 3] = ["ADVANCED_FACE", "FACE_SURFACE", "FACE"];
+
+/// Surfaces that have an equation, or may have one.
+const EQUATIONS: [&str; 6] =
+    ["PLANE", "CYLINDRICAL_SURFACE", "CONICAL_SURFACE", "SPHERICAL_SURFACE", "TOROIDAL_SURFACE", "SURFACE_OF_REVOLUTION"];
 
 impl Builder<'_> {
     /// A face with its bounds and its surface.
@@ -44,10 +49,12 @@ impl Builder<'_> {
         let outer = loops.iter().position(|(is_outer, _)| *is_outer).unwrap_or(0);
         let outer = if loops.is_empty() { Vec::new() } else { loops.remove(outer).1 };
         let surface = record.reference(2).ok().map(|surface| self.surface(surface)).unwrap_or_default();
+        let is_same = record.truth(3).unwrap_or(true);
+        let told = record.reference(2).ok().and_then(|id| self.told(id, &surface, is_same, place));
         let is_untrimmed = outer.is_empty() && loops.is_empty();
         let inner = loops.into_iter().map(|(_, uses)| uses).collect();
         let source = Source { id: Id::Instance(id), line: self.line(id) };
-        self.faces.push(Face { source, entity: record.name.to_string(), surface, outer, inner, is_untrimmed });
+        self.faces.push(Face { source, entity: record.name.to_string(), surface, told, outer, inner, is_untrimmed });
     }
 
     /// EDGE_LOOP: edges in their order. POLY_LOOP: straight ones from point to point. VERTEX_LOOP: none.
@@ -120,10 +127,27 @@ impl Builder<'_> {
             outer = Some(loops.remove(0));
         }
         let is_untrimmed = outer.is_none();
-        let surface = self.surface(surface);
+        let id_of_surface = surface;
+        let surface = self.surface(id_of_surface);
+        let told = self.told(id_of_surface, &surface, true, place);
         let source = Source { id: Id::Instance(id), line: self.line(id) };
         let (entity, outer) = ("CURVE_BOUNDED_SURFACE".to_owned(), outer.unwrap_or_default());
-        self.faces.push(Face { source, entity, surface, outer, inner: loops, is_untrimmed });
+        self.faces.push(Face { source, entity, surface, told, outer, inner: loops, is_untrimmed });
+    }
+
+    /// The surface of a face where that is placed, if it has an equation.
+    fn told(&mut self, id: u64, name: &str, is_same: bool, place: Place) -> Option<Told> {
+        // B-spline surfaces are long, and never are one of these.
+        if !EQUATIONS.contains(&name) {
+            return None;
+        }
+        match self.carried(id, 0) {
+            Ok(carried) => carried.carrier.told(is_same)?.transformed(&self.map_of(place)),
+            Err(why) => {
+                self.note(id, "a surface that is damaged and not used", &why);
+                None
+            }
+        }
     }
 
     /// What a surface is called.

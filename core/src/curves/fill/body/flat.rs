@@ -4,8 +4,8 @@ use crate::curves::curve::Spline;
 use crate::curves::export::{EdgeUse, Surface};
 use crate::curves::vector::Point;
 
-use super::super::space::Frame;
 use super::edges::Edges;
+use crate::curves::elementary::Frame;
 
 type Found = Option<(Surface, Vec<Vec<EdgeUse>>)>;
 

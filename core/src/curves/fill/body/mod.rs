@@ -41,7 +41,9 @@ pub fn body(shapes: &[&Shape], outlines: &[Outline], filled: &Filled, unit: &Uni
     let mut left = Vec::new();
     let mut faces = Vec::with_capacity(outlines.len());
     for (number, ((outline, surface), report)) in outlines.iter().zip(&filled.surfaces).zip(&filled.reports).enumerate() {
-        let found = face(&mut edges, outline, surface, report.is_flipped);
+        // The other way around, the surface is on the other side of its outline.
+        let is_left = report.is_left.map(|is_left| is_left != report.is_flipped);
+        let found = face(&mut edges, outline, surface, (report.is_flipped, is_left));
         let is_closed = |face: &Face| std::iter::once(&face.outer).chain(&face.inner).all(|ring| edges.is_closed(ring));
         match found.filter(|found| found.iter().all(is_closed)) {
             Some(found) => {
@@ -55,11 +57,16 @@ pub fn body(shapes: &[&Shape], outlines: &[Outline], filled: &Filled, unit: &Uni
     (body, left)
 }
 
-fn face(edges: &mut Edges, outline: &Outline, surface: &Surface, is_flipped: bool) -> Option<Vec<Face>> {
+fn face(
+    edges: &mut Edges,
+    outline: &Outline,
+    surface: &Surface,
+    (is_flipped, is_left): (bool, Option<bool>),
+) -> Option<Vec<Face>> {
     let one = match surface {
         Surface::Carrier(carrier) => {
             let rings = edges.rings(outline, is_flipped)?;
-            trim::face(edges, carrier, rings)
+            trim::face(edges, carrier, (rings, is_left))
         }
         Surface::Coons(coons) => whole::of_coons(edges, coons, outline, is_flipped),
         Surface::Centre { curve, ends, centre } => whole::of_centre(edges, curve, ends, *centre, outline, is_flipped),

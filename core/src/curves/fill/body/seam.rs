@@ -5,11 +5,12 @@ use std::f64::consts::TAU;
 use crate::curves::curve::{Spline, fit};
 use crate::curves::export::EdgeUse;
 
-use super::super::carrier::Carrier;
 use super::super::chart::{Chart, Turned};
 use super::super::options::Outline;
+use super::super::side;
 use super::edges::{Edges, turn};
 use super::lift::{Lifted, coordinates, growth, lift, near};
+use crate::curves::elementary::Elementary;
 
 /// Angles that are nearer than this are the same.
 const SAME: f64 = 1e-9;
@@ -26,8 +27,15 @@ fn around(lifted: &[Vec<Lifted>]) -> Option<(usize, usize)> {
     }
 }
 
+/// Twice the area within a loop in coordinates, by samples.
+fn area(ring: &[Lifted]) -> f64 {
+    let places: Vec<[f64; 2]> = ring.iter().flat_map(|one| one.samples.iter().map(|(_, place)| *place)).collect();
+    let pairs = places.iter().zip(places.iter().cycle().skip(1));
+    pairs.map(|([a, b], [c, d])| a * d - b * c).sum()
+}
+
 /// Cuts the second loop around a surface where a seam from the beginning of the first one comes to it.
-pub(super) fn prepare(edges: &mut Edges, carrier: &Carrier, outline: &Outline) -> Option<()> {
+pub(super) fn prepare(edges: &mut Edges, carrier: &Elementary, outline: &Outline) -> Option<()> {
     let Chart::Turned(turned) = Chart::of(carrier) else { return None };
     let rings = edges.rings(outline, false)?;
     let lifted: Vec<Vec<Lifted>> = rings.into_iter().map(|ring| lift(edges, &turned, ring, None)).collect::<Option<_>>()?;
@@ -58,10 +66,19 @@ pub(super) fn prepare(edges: &mut Edges, carrier: &Carrier, outline: &Outline) -
     None
 }
 
-/// Loops, of which two that run around are one.
-pub(super) fn joined(edges: &mut Edges, turned: &Turned, mut rings: Vec<Vec<EdgeUse>>) -> Option<Vec<Vec<EdgeUse>>> {
+/// Loops, of which two that run around are one. `None` where the surface is all of a torus but what is within loops: it has seams both ways.
+pub(super) fn joined(
+    edges: &mut Edges,
+    turned: &Turned,
+    (mut rings, is_left): (Vec<Vec<EdgeUse>>, Option<bool>),
+) -> Option<Vec<Vec<EdgeUse>>> {
     let lifted: Vec<Vec<Lifted>> = rings.iter().map(|ring| lift(edges, turned, ring.clone(), None)).collect::<Option<_>>()?;
-    let Some((other, axis)) = around(&lifted) else { return Some(rings) };
+    let Some((other, axis)) = around(&lifted) else {
+        let is_around =
+            turned.is_tube() && is_left.is_some_and(|is_left| lifted.first().is_some_and(|ring| (area(ring) > 0.0) != is_left));
+        return (!is_around).then_some(rings);
+    };
+    let growth_of_first = growth(lifted.first()?);
     let [first, second] = [0, other].map(|at| lifted.get(at).map(|ring| growth(ring)[axis]).unwrap_or_default());
     let start = lifted.first()?.first()?.samples.first()?.1;
     let mut inner = rings.remove(other);
@@ -80,7 +97,9 @@ pub(super) fn joined(edges: &mut Edges, turned: &Turned, mut rings: Vec<Vec<Edge
     let [from, _] = edges.ends(outer.first()?)?;
     let [to, _] = edges.ends(inner.first()?)?;
     let [a, b] = [from, to].map(|vertex| edges.vertices.get(vertex).copied().unwrap_or_default());
-    let target = coordinates(turned, b, start, edges.tolerance).0;
+    let near = coordinates(turned, b, start, edges.tolerance).0;
+    let more = side::turn_more(turned, growth_of_first, [start, near], is_left);
+    let target = [near[0] + more[0], near[1] + more[1]];
     let curve = match turned {
         Turned::Torus(..) => {
             let place = |t: f64| turned.at([0, 1].map(|axis| start[axis] + (target[axis] - start[axis]) * t));

@@ -4,11 +4,11 @@ use super::edges::{Edges, turn};
 use super::{flat, turned};
 use crate::curves::export::{EdgeUse, Face, Surface};
 
-use super::super::carrier::Carrier;
-use super::super::chart::{Chart, Turned};
+use super::super::chart::Chart;
+use crate::curves::elementary::Elementary;
 
-/// A face whose loops have curves of parameters.
-pub(super) fn face(edges: &mut Edges, carrier: &Carrier, rings: Vec<Vec<EdgeUse>>) -> Option<Face> {
+/// A face on the side of its first loop that is told, if any is, whose loops have curves of parameters.
+pub(super) fn face(edges: &mut Edges, carrier: &Elementary, (rings, is_left): (Vec<Vec<EdgeUse>>, Option<bool>)) -> Option<Face> {
     match Chart::of(carrier) {
         Chart::Plane(frame) => {
             let (surface, rings) = flat::plane(edges, &frame, rings)?;
@@ -18,14 +18,12 @@ pub(super) fn face(edges: &mut Edges, carrier: &Carrier, rings: Vec<Vec<EdgeUse>
             let (surface, rings) = flat::sphere(edges, &frame, radius, rings)?;
             Some(oriented(surface, rings))
         }
-        Chart::Turned(turned) => of_turned(edges, &turned, rings),
+        Chart::Turned(turned) => {
+            let (surface, rings) = turned::trimmed(edges, &turned, (rings, is_left))?;
+            Some(oriented(surface, rings))
+        }
         _ => None,
     }
-}
-
-fn of_turned(edges: &mut Edges, turned: &Turned, rings: Vec<Vec<EdgeUse>>) -> Option<Face> {
-    let (surface, rings) = turned::trimmed(edges, turned, rings)?;
-    Some(oriented(surface, rings))
 }
 
 /// The first loop has the direction that is wanted: the surface is to its left as seen from outside, and other loops run the

@@ -30,7 +30,11 @@ impl Along {
 }
 
 /// The surface between the angles of its outline, and loops with curves of parameters.
-pub(super) fn trimmed(edges: &mut Edges, turned: &Turned, rings: Vec<Vec<EdgeUse>>) -> Option<(Surface, Vec<Vec<EdgeUse>>)> {
+pub(super) fn trimmed(
+    edges: &mut Edges,
+    turned: &Turned,
+    rings: (Vec<Vec<EdgeUse>>, Option<bool>),
+) -> Option<(Surface, Vec<Vec<EdgeUse>>)> {
     let rings = seam::joined(edges, turned, rings)?;
     let edges = &*edges;
     let mut lifted = Vec::with_capacity(rings.len());

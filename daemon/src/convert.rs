@@ -44,7 +44,8 @@ fn convert(args: &ConvertArgs) -> Result<Converted, String> {
     let draft = Draft::new(fsx::folder_of(output)).map_err(failed)?;
     let mut limits = args.spend.limits(false);
     limits.spool.get_or_insert_with(|| fsx::folder_of(output).to_owned());
-    let converted = suture_core::convert(input, &draft.path(), format, &limits, &Quiet).map_err(|error| error.to_string())?;
+    let converted =
+        suture_core::convert(input, &draft.path(), format, &limits, &Quiet).map_err(|error| draft.told(&error, output))?;
     draft.place_like(input, output, args.force).map_err(failed)?;
     Ok(converted)
 }

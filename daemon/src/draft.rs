@@ -50,6 +50,11 @@ impl Draft {
         }
     }
 
+    /// An error's line, with the name that the draft is to have instead of its own, which says nothing to anybody.
+    pub(crate) fn told(&self, error: &suture_core::Error, output: &Path) -> String {
+        error.to_string().replace(&*self.path().display().to_string(), &output.display().to_string())
+    }
+
     /// Has anything been written?
     pub(crate) fn is_written(&self) -> bool {
         match &self.kind {

@@ -165,8 +165,8 @@ fn write_mesh(
     let mut limits = args.spend.limits(false);
     limits.spool.get_or_insert_with(|| fsx::folder_of(output).to_owned());
     let of = (first(args), &filled.filled, network.unit.millimetres);
-    let mut mesh =
-        suture_core::write_curve_mesh(of, (&draft.path(), format), &limits, &Quiet).map_err(|error| error.to_string())?;
+    let mut mesh = suture_core::write_curve_mesh(of, (&draft.path(), format), &limits, &Quiet)
+        .map_err(|error| draft.told(&error, output))?;
     // The report is of the file by its name, not of the draft.
     output.clone_into(&mut mesh.report.input.path);
     draft.place_like(first(args), output, args.force).map_err(failed)?;

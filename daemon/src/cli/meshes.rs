@@ -101,16 +101,16 @@ pub(crate) struct ConvertArgs {
 #[command(group = ArgGroup::new("limits").multiple(true))]
 pub(crate) struct DefeatureArgs {
     /// Remove holes of a smaller diameter, through or blind; lengths are in the file's units
-    #[arg(long, value_name = "D", value_parser = parse_length, group = "limits")]
+    #[arg(long, value_name = "D", value_parser = parse_length, allow_negative_numbers = true, group = "limits")]
     pub holes_below: Option<f64>,
     /// Remove fillets of a smaller radius, and narrower chamfers
-    #[arg(long, value_name = "R", value_parser = parse_length, group = "limits")]
+    #[arg(long, value_name = "R", value_parser = parse_length, allow_negative_numbers = true, group = "limits")]
     pub fillets_below: Option<f64>,
     /// Remove narrower grooves, slots and pockets, engraved letters among them
-    #[arg(long, value_name = "W", value_parser = parse_length, group = "limits")]
+    #[arg(long, value_name = "W", value_parser = parse_length, allow_negative_numbers = true, group = "limits")]
     pub grooves_below: Option<f64>,
     /// Remove lower bosses, embossed letters among them
-    #[arg(long, value_name = "H", value_parser = parse_length, group = "limits")]
+    #[arg(long, value_name = "H", value_parser = parse_length, allow_negative_numbers = true, group = "limits")]
     pub bosses_below: Option<f64>,
     #[command(flatten)]
     pub repair: RepairArgs,
@@ -120,7 +120,7 @@ pub(crate) struct DefeatureArgs {
 #[derive(Args, Debug)]
 pub(crate) struct KeepEdges {
     /// Keep edges where the surface turns by more degrees [default: 40]
-    #[arg(long, value_name = "DEGREES", value_parser = parse_length)]
+    #[arg(long, value_name = "DEGREES", value_parser = parse_length, allow_negative_numbers = true)]
     pub keep_edges: Option<f64>,
 }
 
@@ -133,7 +133,7 @@ pub(crate) struct SimplifyArgs {
     #[arg(long, value_name = "SHARE", value_parser = parse_share, group = "wanted")]
     pub ratio: Option<f64>,
     /// The surface stays within this distance, both ways, proved; alone, triangles are made as few as it allows; lengths are in the file's units
-    #[arg(long, value_name = "D", value_parser = parse_length)]
+    #[arg(long, value_name = "D", value_parser = parse_length, allow_negative_numbers = true)]
     pub max_deviation: Option<f64>,
     #[command(flatten)]
     pub edges: KeepEdges,
@@ -144,7 +144,7 @@ pub(crate) struct SimplifyArgs {
 #[derive(Args, Debug)]
 pub(crate) struct SmoothArgs {
     /// Smooth waves that are shorter than this; lengths are in the file's units
-    #[arg(long, value_name = "L", value_parser = parse_length)]
+    #[arg(long, value_name = "L", value_parser = parse_length, allow_negative_numbers = true)]
     pub waves_below: Option<f64>,
     /// Leave at most this share of their height [default: 0.1]
     #[arg(long, value_name = "SHARE", value_parser = parse_share)]
@@ -164,7 +164,7 @@ pub(crate) struct ResidueArgs {
     #[arg(long = "tool", value_name = "TOOL")]
     pub tools: Vec<String>,
     /// How far the mesh may be from what the tool cut, in millimetres: noise of the simulation [default: by the tool's size]
-    #[arg(long, value_name = "T", value_parser = parse_length)]
+    #[arg(long, value_name = "T", value_parser = parse_length, allow_negative_numbers = true)]
     pub tolerance: Option<f64>,
     /// A box whose triangles are residue's, by two corners; several times
     #[arg(long, value_name = "X,Y,Z:X,Y,Z", value_parser = parse_box, allow_hyphen_values = true)]
@@ -191,22 +191,22 @@ pub(crate) struct FillCurvesArgs {
     #[arg(long)]
     pub curves_alone: bool,
     /// Close open ends by straight curves, the nearest two first, none longer than this; lengths are in the unit of the file
-    #[arg(long, value_name = "LENGTH", value_parser = parse_length)]
+    #[arg(long, value_name = "LENGTH", value_parser = parse_length, allow_negative_numbers = true)]
     pub close_gaps: Option<f64>,
     /// How far fitted curves may be from their own [default: 5e-7 of the length of each]
-    #[arg(long, value_name = "LENGTH", value_parser = parse_length)]
+    #[arg(long, value_name = "LENGTH", value_parser = parse_length, allow_negative_numbers = true)]
     pub tolerance: Option<f64>,
     /// How far edges of the mesh may be from curves and surfaces [default: 1/500 of each outline]
-    #[arg(long, value_name = "LENGTH", value_parser = parse_length)]
+    #[arg(long, value_name = "LENGTH", value_parser = parse_length, allow_negative_numbers = true)]
     pub chord: Option<f64>,
     /// How much curves may turn along an edge of the mesh, in degrees [default: 20]
-    #[arg(long, value_name = "DEGREES", value_parser = parse_length)]
+    #[arg(long, value_name = "DEGREES", value_parser = parse_length, allow_negative_numbers = true)]
     pub angle: Option<f64>,
     /// Give blended surfaces the tangent planes of the surfaces beside them
     #[arg(long)]
     pub tangent: bool,
     /// The longest edge of the mesh [default: by the curves]
-    #[arg(long, value_name = "LENGTH", value_parser = parse_length)]
+    #[arg(long, value_name = "LENGTH", value_parser = parse_length, allow_negative_numbers = true)]
     pub edge: Option<f64>,
     /// Draw the curves, and beside them the surfaces that fill them: red are curves of no surface, green those that close gaps
     #[arg(long, value_name = "PNG")]

@@ -26,10 +26,10 @@ pub(crate) struct CurvesArgs {
     #[arg(value_name = "FILE", required = true)]
     pub files: Vec<PathBuf>,
     /// Ends no farther apart are the same point, in the unit of the file [default: derived from the file]
-    #[arg(long, value_name = "LENGTH", value_parser = parse_length)]
+    #[arg(long, value_name = "LENGTH", value_parser = parse_length, allow_negative_numbers = true)]
     pub tolerance: Option<f64>,
     /// Close open ends by straight curves, the nearest two first, none longer than this, in the unit of the file
-    #[arg(long, value_name = "LENGTH", value_parser = parse_length)]
+    #[arg(long, value_name = "LENGTH", value_parser = parse_length, allow_negative_numbers = true)]
     pub close_gaps: Option<f64>,
     /// Print JSON, a line for each file
     #[arg(long)]
@@ -38,7 +38,7 @@ pub(crate) struct CurvesArgs {
 
 fn parse_length(text: &str) -> Result<f64, String> {
     let length = text.parse::<f64>().ok().filter(|length| length.is_finite() && *length >= 0.0);
-    length.ok_or_else(|| "a length, as 0.01".into())
+    length.ok_or_else(|| "a number from 0 on, as 0.01".into())
 }
 
 #[derive(Args, Debug)]

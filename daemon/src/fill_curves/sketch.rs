@@ -42,7 +42,7 @@ fn strokes(network: &Network, filled: &FilledNetwork, left: &[usize]) -> Vec<Str
     let shapes = filled.shapes(network);
     let mut bounds = vec![false; shapes.len()];
     let outlines = filled.outlines.iter().enumerate().filter(|(number, _)| left.binary_search(number).is_err());
-    for used in outlines.flat_map(|(_, outline)| std::iter::once(&outline.outer).chain(&outline.inner)).flatten() {
+    for used in outlines.flat_map(|(_, outline)| outline.rings()).flatten() {
         bounds.iter_mut().skip(used.curve).take(1).for_each(|is_bound| *is_bound = true);
     }
     let is_left_out = |number: usize| filled.loops.as_ref().is_some_and(|loops| loops.left_out.binary_search(&number).is_ok());

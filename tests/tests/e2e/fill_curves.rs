@@ -102,3 +102,68 @@ fn several_files_are_one_network_and_their_picture_stands_beside_the_result() {
     let refused = place.suture(["fill-curves", "first.json", "last.json", "-o", "new.stl", "--picture", "last.json", "--force"]);
     assert!(refused.expect(2).stderr().contains("ends with .png") && !place.at("new.stl").exists());
 }
+
+/// Six lines between four points are a tetrahedron.
+#[test]
+fn the_edges_of_a_tetrahedron_become_its_faces() {
+    let place = Place::new();
+    let corners = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+    let lines: Vec<Value> = (0..4).flat_map(|a| (a + 1..4).map(move |b| json!({ "line": [corners[a], corners[b]] }))).collect();
+    place.put("wire.json", json!({ "unit": "mm", "curves": lines }).to_string().as_bytes());
+    let told = told(&place, &["wire.json", "-o", "out.stl"]);
+    assert_eq!(
+        (told["mesh"]["verdict"]["good"].as_bool(), told["mesh"]["input"]["triangles"].as_u64()),
+        (Some(true), Some(4)),
+        "{told}"
+    );
+    assert!((told["mesh"]["before"]["volume"].as_f64().unwrap() - 1.0 / 6.0).abs() < 1e-6, "{told}");
+}
+
+/// Two squares that cross each other: both are filled, and the mesh crosses itself, which the exit status says.
+#[test]
+fn a_mesh_that_crosses_itself_is_not_good() {
+    let place = Place::new();
+    let square = |corners: [[f64; 3]; 4]| (0..4).map(move |k| json!({ "line": [corners[k], corners[(k + 1) % 4]] }));
+    let flat = square([[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [-1.0, 1.0, 0.0]]);
+    let upright = square([[0.0, -0.5, -1.0], [0.0, 0.5, -1.0], [0.0, 0.5, 1.0], [0.0, -0.5, 1.0]]);
+    place.put("cross.json", json!({ "unit": "mm", "curves": flat.chain(upright).collect::<Vec<_>>() }).to_string().as_bytes());
+    let said = place.suture(["fill-curves", "cross.json", "-o", "out.stl"]).expect(1).stdout();
+    assert!(said.contains("self-intersecting"), "{said}");
+}
+
+/// A whole sphere has no curve, and half of one has the same curve as a disc: both are what the file says. A face whose surface has no equation and that no
+/// curve bounds is named.
+#[test]
+fn surfaces_that_a_file_says_are_used() {
+    let place = Place::new();
+    let step = |faces: &str| {
+        format!(
+            "ISO-10303-21;\nHEADER;\nENDSEC;\nDATA;\n#1=CARTESIAN_POINT('',(0.,0.,0.));\n#2=AXIS2_PLACEMENT_3D('',#1,$,$);\n\
+             #3=SPHERICAL_SURFACE('',#2,5.);\n#4=PLANE('',#2);\n#5=CARTESIAN_POINT('',(5.,0.,0.));\n#6=VERTEX_POINT('',#5);\n\
+             #7=CIRCLE('',#2,5.);\n#8=EDGE_CURVE('',#6,#6,#7,.T.);\n#9=ORIENTED_EDGE('',*,*,#8,.T.);\n#10=EDGE_LOOP('',(#9));\n\
+             #11=FACE_BOUND('',#10,.T.);\n#12=FACE_BOUND('',#10,.F.);\n#13=VERTEX_LOOP('',#6);\n#14=FACE_BOUND('',#13,.T.);\n\
+             #15=OFFSET_SURFACE('',#3,1.,.F.);\n{faces}\n\
+             #30=(GEOMETRIC_REPRESENTATION_CONTEXT(3) GLOBAL_UNIT_ASSIGNED_CONTEXT((#31)) REPRESENTATION_CONTEXT('',''));\n\
+             #31=(LENGTH_UNIT() NAMED_UNIT(*) SI_UNIT(.MILLI.,.METRE.));\nENDSEC;\nEND-ISO-10303-21;\n"
+        )
+    };
+    let ball = 4.0 / 3.0 * std::f64::consts::PI * 125.0;
+    let whole = "#20=ADVANCED_FACE('',(#14),#3,.T.);\n#21=CLOSED_SHELL('',(#20));\n#22=MANIFOLD_SOLID_BREP('',#21);\n#23=ADVANCED_BREP_SHAPE_REPRESENTATION('',(#22),#30);";
+    let half = "#20=ADVANCED_FACE('',(#11),#3,.T.);\n#24=ADVANCED_FACE('',(#12),#4,.F.);\n#21=CLOSED_SHELL('',(#20,#24));\n#22=MANIFOLD_SOLID_BREP('',#21);\n#23=ADVANCED_BREP_SHAPE_REPRESENTATION('',(#22),#30);";
+    for (faces, volume) in [(whole, ball), (half, 0.5 * ball)] {
+        place.put("ball.stp", step(faces).as_bytes());
+        let told = told(&place, &["ball.stp", "-o", "out.stl", "--chord", "0.005"]);
+        assert_eq!(told["mesh"]["verdict"]["good"].as_bool(), Some(true), "{told}");
+        assert!((told["mesh"]["before"]["volume"].as_f64().unwrap() / volume - 1.0).abs() < 4e-3, "{told}");
+    }
+    let bare = half
+        .replace("#21=CLOSED_SHELL('',(#20,#24))", "#25=ADVANCED_FACE('',(#14),#15,.T.);\n#21=CLOSED_SHELL('',(#20,#24,#25))");
+    place.put("bare.stp", step(&bare).as_bytes());
+    let said = place.suture(["fill-curves", "bare.stp", "-o", "out.stl", "--force"]).expect(1).stdout();
+    assert!(said.contains("#25") && said.contains("OFFSET_SURFACE"), "{said}");
+    // Without the surfaces, a circle bounds a disc: the same twice.
+    let said =
+        place.suture(["fill-curves", "--json", "ball.stp", "-o", "out.stl", "--force", "--curves-alone"]).expect(1).stdout();
+    let alone: Value = serde_json::from_str(&said).unwrap();
+    assert_eq!(alone["outlines"][0]["method"], "plane", "{alone}");
+}

@@ -185,9 +185,7 @@ fn sharing(outlines: &[Outline], numbers: &[usize]) -> Vec<usize> {
     if numbers.is_empty() {
         return Vec::new();
     }
-    let curves = |outline: &'_ Outline| -> Vec<usize> {
-        std::iter::once(&outline.outer).chain(&outline.inner).flatten().map(|one| one.curve).collect()
-    };
+    let curves = |outline: &'_ Outline| -> Vec<usize> { outline.rings().flatten().map(|one| one.curve).collect() };
     let known: BTreeSet<usize> = numbers.iter().filter_map(|number| outlines.get(*number)).flat_map(curves).collect();
     (0..outlines.len()).filter(|number| curves(&outlines[*number]).iter().any(|curve| known.contains(curve))).collect()
 }
@@ -292,9 +290,9 @@ fn collected(
 
 fn strands<'a>(shapes: &[&'a Shape], outlines: &[Outline]) -> Result<Strands<'a>, FillError> {
     let mut is_used = vec![false; shapes.len()];
-    for (outline, Outline { outer, inner }) in outlines.iter().enumerate() {
-        for one in std::iter::once(outer).chain(inner).flatten() {
-            let unknown = FillError::Unknown { outline, curve: one.curve };
+    for (number, outline) in outlines.iter().enumerate() {
+        for one in outline.rings().flatten() {
+            let unknown = FillError::Unknown { outline: number, curve: one.curve };
             *is_used.get_mut(one.curve).ok_or(unknown)? = true;
         }
     }

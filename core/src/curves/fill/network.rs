@@ -35,17 +35,14 @@ type Samples = Vec<(f64, u32)>;
 pub(super) fn divide(strands: &Strands<'_>, outlines: &[Outline], options: &Options, longest: &[f64]) -> Divided {
     let (mut limits, wanted) = limits(strands, outlines, options);
     for (outline, longest) in outlines.iter().zip(longest) {
-        for one in std::iter::once(&outline.outer).chain(&outline.inner).flatten() {
+        for one in outline.rings().flatten() {
             limits.iter_mut().skip(one.curve).take(1).for_each(|limit| limit.size = limit.size.min(*longest));
         }
     }
     let pairs = strands.par_iter().zip(&limits);
     let mut samples: grade::Samples =
         pairs.map(|(strand, limits)| strand.as_ref().map(|strand| strand.samples(limits)).unwrap_or_default()).collect();
-    let rings: Vec<Vec<&[Use]>> = outlines
-        .iter()
-        .map(|outline| std::iter::once(&outline.outer).chain(&outline.inner).map(Vec::as_slice).collect())
-        .collect();
+    let rings: Vec<Vec<&[Use]>> = outlines.iter().map(|outline| outline.rings().map(Vec::as_slice).collect()).collect();
     grade::graded(strands, &rings, &mut samples);
     let roots = joined(strands.len(), outlines);
     let mut divided = Divided { wanted, ..Divided::default() };
@@ -82,7 +79,7 @@ const SHARE: f64 = 1.0 / 2048.0;
 
 impl Divided {
     fn rings_of(&self, outline: &Outline) -> Vec<Vec<Rim>> {
-        std::iter::once(&outline.outer).chain(&outline.inner).map(|uses| ring(uses, &self.curves, &self.points)).collect()
+        outline.rings().map(|uses| ring(uses, &self.curves, &self.points)).collect()
     }
 
     /// Divides curves at shares of them, and gives the numbers of the outlines that have these. A place too near to another one is left out. Points that
@@ -106,7 +103,7 @@ impl Divided {
             is_divided.iter_mut().skip(curve).take(1).for_each(|is_divided| *is_divided = true);
         }
         let has = |outline: &Outline| {
-            let mut uses = std::iter::once(&outline.outer).chain(&outline.inner).flatten();
+            let mut uses = outline.rings().flatten();
             uses.any(|one| is_divided.get(one.curve) == Some(&true))
         };
         let touched: Vec<usize> =
@@ -154,13 +151,13 @@ fn limits(strands: &Strands<'_>, outlines: &[Outline], options: &Options) -> (Ve
     let length = |one: &Use| strands.get(one.curve).and_then(Option::as_ref).map_or(0.0, |strand| strand.length);
     let mut wanted = Vec::with_capacity(outlines.len());
     for outline in outlines {
-        let uses = || std::iter::once(&outline.outer).chain(&outline.inner).flatten();
+        let uses = || outline.rings().flatten();
         let probes = uses().filter_map(|one| strands.get(one.curve).and_then(Option::as_ref)).flat_map(|strand| &strand.probes);
         let diagonal = space::size(&probes.copied().collect::<Vec<_>>());
         let chord = options.chord.unwrap_or(2e-3 * diagonal);
         let shortest = uses().map(length).filter(|length| *length > 1e-6 * diagonal).fold(f64::INFINITY, f64::min);
         wanted.push((options.size.unwrap_or(f64::INFINITY), chord));
-        for uses in std::iter::once(&outline.outer).chain(&outline.inner) {
+        for uses in outline.rings() {
             let least = match uses.len() {
                 1 => 8,
                 2 => 2,
@@ -183,7 +180,7 @@ fn limits(strands: &Strands<'_>, outlines: &[Outline], options: &Options) -> (Ve
 pub(super) fn joined(curves: usize, outlines: &[Outline]) -> Vec<usize> {
     let mut parents: Vec<usize> = (0..2 * curves).collect();
     let end = |one: &Use, is_last: bool| 2 * one.curve + usize::from(is_last != one.is_reversed);
-    for uses in outlines.iter().flat_map(|outline| std::iter::once(&outline.outer).chain(&outline.inner)) {
+    for uses in outlines.iter().flat_map(Outline::rings) {
         for (one, next) in uses.iter().zip(uses.iter().cycle().skip(1)) {
             let (a, b) = (root(&mut parents, end(one, true)), root(&mut parents, end(next, false)));
             let (low, high) = (a.min(b), a.max(b));

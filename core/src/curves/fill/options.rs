@@ -99,6 +99,13 @@ pub struct Outline {
     pub inner: Vec<Vec<Use>>,
 }
 
+impl Outline {
+    /// Its loops, the outer one first.
+    pub fn rings(&self) -> impl Iterator<Item = &Vec<Use>> + Clone {
+        std::iter::once(&self.outer).chain(&self.inner)
+    }
+}
+
 impl From<&Loop> for Outline {
     fn from(from: &Loop) -> Self {
         Self { outer: from.uses.clone(), inner: Vec::new() }

@@ -100,7 +100,7 @@ impl Meshed {
 impl<'a> Task<'a> {
     fn uses(&self) -> impl Iterator<Item = (&'a Strand<'a>, Use)> {
         let strands = self.strands;
-        let all = std::iter::once(&self.outline.outer).chain(&self.outline.inner).flatten();
+        let all = self.outline.rings().flatten();
         all.filter_map(move |one| strands.get(one.curve).and_then(Option::as_ref).map(|strand| (strand, *one)))
     }
 
@@ -470,7 +470,7 @@ impl<'a> Task<'a> {
 
     /// Distances of ends that follow each other, each with the length of the shorter curve.
     fn gaps(&self) -> impl Iterator<Item = (f64, f64)> {
-        let loops = std::iter::once(&self.outline.outer).chain(&self.outline.inner);
+        let loops = self.outline.rings();
         loops.flat_map(|uses| {
             let ends = |one: &Use| {
                 let strand = self.strands.get(one.curve).and_then(Option::as_ref)?;
@@ -489,10 +489,6 @@ impl<'a> Task<'a> {
     /// Whether its curves are one circle, or circles around one axis alone.
     fn is_ambiguous(&self) -> bool {
         self.uses().all(|(strand, _)| matches!(strand.kind, Kind::Round { .. }))
-            && self
-                .rings
-                .iter()
-                .zip(std::iter::once(&self.outline.outer).chain(&self.outline.inner))
-                .all(|(_, uses)| uses.len() == 1)
+            && self.rings.iter().zip(self.outline.rings()).all(|(_, uses)| uses.len() == 1)
     }
 }

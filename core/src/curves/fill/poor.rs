@@ -116,7 +116,7 @@ impl<'a> Angles<'a> {
 
 /// Where to divide curves, for wishes between points of rings that are not cut. O((points + wishes) · log points).
 pub(super) fn splits(outline: &Outline, rings: &[Vec<Rim>], wishes: &[Wish]) -> Vec<Split> {
-    let loops = std::iter::once(&outline.outer).chain(&outline.inner);
+    let loops = outline.rings();
     let mut known: Vec<([u32; 2], f64, Rim, usize)> = Vec::new();
     for (ring, uses) in rings.iter().zip(loops) {
         for (one, next) in ring.iter().zip(ring.iter().cycle().skip(1)) {

@@ -5,7 +5,7 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use super::*;
 use crate::curves::curve::{Arc, Curve, Id, Role, Shape, Source, Spline, fit};
 use crate::curves::elementary::{Elementary, Frame, Told};
-use crate::curves::vector::{cross, dot};
+use crate::curves::vector::{Point, cross, distance, dot};
 use crate::curves::{Face, Network, Unit, Use, loops};
 
 const SOURCE: Source = Source { id: Id::Place(0), line: 0 };
@@ -82,6 +82,37 @@ fn check(result: &FilledNetwork, wanted: f64, name: &str) {
     }
 }
 
+/// The body of a result has a face for each outline but so many, and all meet: each edge is passed once in each direction, if none is left. Surfaces reach as
+/// far as the mesh does: points of it have parameters.
+fn check_body(result: &FilledNetwork, curves: &[Shape], left: usize) {
+    let shapes: Vec<&Shape> = curves.iter().chain(&result.added).collect();
+    let (body, missing) = body(&shapes, &result.outlines, &result.filled, &Unit { name: "mm".into(), millimetres: 1.0 });
+    assert_eq!((missing.len(), body.faces.len() + left), (left, result.outlines.len()));
+    let mut counts = vec![0_i32; body.edges.len()];
+    for one in body.faces.iter().flat_map(|face| std::iter::once(&face.outer).chain(&face.inner)).flatten() {
+        counts[one.edge] += if one.is_reversed { -1 } else { 1 };
+    }
+    assert!(left > 0 || counts.iter().all(|count| *count == 0), "{counts:?}");
+    let points = |number: usize| {
+        let corners =
+            result.filled.mesh.triangles.iter().zip(&result.filled.mesh.face_of).filter(move |(_, own)| **own as usize == number);
+        corners.flat_map(|(triangle, _)| triangle.map(|corner| result.filled.mesh.points[corner as usize]))
+    };
+    let faces = (0..result.outlines.len()).filter(|number| !missing.contains(number)).zip(&body.faces);
+    for (number, face) in faces {
+        let surface = &face.surface;
+        let surface =
+            SplineSurface::new(surface.degrees, surface.knots.clone(), surface.points.clone(), surface.weights.clone()).unwrap();
+        let [[a, b], [c, d]] = surface.domain();
+        let grid: Vec<Point> = (0..=100)
+            .flat_map(|u| (0..=100).map(move |v| (f64::from(u) / 100.0, f64::from(v) / 100.0)))
+            .map(|(u, v)| surface.jet([a + (b - a) * u, c + (d - c) * v]).point)
+            .collect();
+        // Points of the grid are nowhere farther apart than this, on surfaces of this size.
+        assert!(points(number).step_by(11).all(|point| grid.iter().any(|other| distance(*other, point) < 0.3)), "{number}");
+    }
+}
+
 /// An eighth of a ball, and a ball without it: the same curves, but the sphere is on the other side of them.
 #[test]
 fn a_sphere_is_on_the_side_that_is_told() {
@@ -89,12 +120,14 @@ fn a_sphere_is_on_the_side_that_is_told() {
         let arcs = vec![quarter(0, 1), quarter(1, 2), quarter(2, 0)];
         let spokes =
             (0..3).map(|axis| Shape::Line([FRAME.origin, FRAME.outside([0, 1, 2].map(|k| if k == axis { 2.0 } else { 0.0 }))]));
-        let shapes = arcs.into_iter().chain(spokes).collect();
+        let shapes: Vec<Shape> = arcs.into_iter().chain(spokes).collect();
+        let curves = shapes.clone();
         let flat = [[4, 1, -5], [5, 2, -6], [6, 3, -4]];
         let mut faces: Vec<Face> = flat.iter().map(|ring| face(&[ring], None)).collect();
         faces.push(face(&[&[1, 2, 3]], Some((BALL, is_left))));
         let result = filled(shapes, faces);
         check(&result, share * 4.0 / 3.0 * PI * 8.0, "ball");
+        check_body(&result, &curves, 0);
         assert!(result.filled.reports[3].is_told);
     }
 }
@@ -121,8 +154,10 @@ fn a_circle_bounds_what_is_told() {
 fn a_torus_is_on_the_side_that_is_told() {
     for is_left in [true, false] {
         let ring: &[&[i32]] = &[&[1], &[-2]];
-        let result = filled(vec![circle(4.0), circle(2.0)], vec![face(ring, None), face(ring, Some((RING, is_left)))]);
+        let curves = [circle(4.0), circle(2.0)];
+        let result = filled(curves.to_vec(), vec![face(ring, None), face(ring, Some((RING, is_left)))]);
         check(&result, PI * PI * 3.0, "half of a torus");
+        check_body(&result, &curves, 0);
         let high = result
             .filled
             .mesh
@@ -138,7 +173,9 @@ fn a_torus_is_on_the_side_that_is_told() {
 #[test]
 fn whole_surfaces_need_no_curves() {
     check(&filled(Vec::new(), vec![face(&[], Some((BALL, true)))]), 4.0 / 3.0 * PI * 8.0, "ball");
-    check(&filled(Vec::new(), vec![face(&[], Some((RING, true)))]), 2.0 * PI * PI * 3.0, "torus");
+    let torus = filled(Vec::new(), vec![face(&[], Some((RING, true)))]);
+    check(&torus, 2.0 * PI * PI * 3.0, "torus");
+    check_body(&torus, &[], 0);
     let meridian = quarter(0, 2);
     check(&filled(vec![meridian], vec![face(&[&[1, -1]], Some((BALL, true)))]), 4.0 / 3.0 * PI * 8.0, "ball with a seam");
     let result = filled(vec![circle(2.0)], vec![face(&[&[1]], None), face(&[], None)]);
@@ -155,8 +192,11 @@ fn a_loop_bounds_what_is_around_it() {
         };
         let loops: Spline = fit(at, &[0.0, 0.5, 1.0], 1e-10).unwrap().0;
         let both = [true, false].map(|is_left| face(&[&[1]], Some((RING, is_left))));
-        let result = filled(vec![Shape::Spline(loops)], both.to_vec());
+        let curves = [Shape::Spline(loops)];
+        let result = filled(curves.to_vec(), both.to_vec());
         check(&result, 2.0 * PI * PI * 3.0, "torus");
+        // With seams both ways, the larger part is none of the surfaces that files get.
+        check_body(&result, &curves, 1);
         let of = |outline: u32| result.filled.mesh.face_of.iter().filter(|own| **own == outline).count();
         assert!(of(0) * 5 < of(1), "{} {}", of(0), of(1));
     }

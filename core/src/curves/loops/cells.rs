@@ -8,7 +8,8 @@
 //! faces of many sides are found, too.
 //!
 //! The last cycle of a part that it closes is a face only if it does not go around all others: if it is no longer than the longest of them, or
-//! its area is less than half of theirs. So the outline of a flat network is no face, and the bottom of a box is one.
+//! its area is less than half of theirs, or less than 9/10 where it has no more sides than they. So the outline of a flat network is no face, and the bottom of
+//! a box, or of a tetrahedron, is one.
 
 use std::cmp::Reverse;
 use std::collections::{BinaryHeap, HashSet};
@@ -52,6 +53,7 @@ struct Patch {
     open: i64,
     area: f64,
     longest: f64,
+    sides: usize,
 }
 
 struct Cells<'a, 'b> {
@@ -222,16 +224,24 @@ impl Cells<'_, '_> {
         let area = norm(self.area(&cycle.uses));
         let of = |patch: &usize| self.patches.get(*patch).copied();
         let others = joined.iter().filter_map(of);
-        let (open, sum, longest) = others.fold((0, 0.0, 0.0_f64), |(open, area, longest), patch| {
-            (open + patch.open, area + patch.area, longest.max(patch.longest))
+        let (open, sum, longest, sides) = others.fold((0, 0.0, 0.0_f64, 0), |(open, area, longest, sides), patch| {
+            (open + patch.open, area + patch.area, longest.max(patch.longest), sides.max(patch.sides))
         });
         let open = open + cycle.key.len() as i64 - 2 * shared;
-        let is_face = open > 0 || cycle.length <= longest * (1.0 + 1e-9) || area < 0.5 * sum;
+        let own = cycle.key.len();
+        let share = if own <= sides { 0.9 } else { 0.5 };
+        let is_face = open > 0 || cycle.length <= longest * (1.0 + 1e-9) || area < share * sum;
         if !is_face {
             return;
         }
         let number = self.cells.len();
-        self.patches.push(Patch { parent: number, open, area: area + sum, longest: longest.max(cycle.length) });
+        self.patches.push(Patch {
+            parent: number,
+            open,
+            area: area + sum,
+            longest: longest.max(cycle.length),
+            sides: sides.max(own),
+        });
         for patch in joined {
             self.patches.iter_mut().skip(patch).take(1).for_each(|patch| patch.parent = number);
         }

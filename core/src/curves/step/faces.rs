@@ -129,7 +129,8 @@ impl Builder<'_> {
         let is_untrimmed = outer.is_none();
         let id_of_surface = surface;
         let surface = self.surface(id_of_surface);
-        let told = self.told(id_of_surface, &surface, true, place);
+        // Programs do not keep to the direction of these boundaries.
+        let told = self.told(id_of_surface, &surface, true, place).map(|told| Told { is_left: None, ..told });
         let source = Source { id: Id::Instance(id), line: self.line(id) };
         let (entity, outer) = ("CURVE_BOUNDED_SURFACE".to_owned(), outer.unwrap_or_default());
         self.faces.push(Face { source, entity, surface, told, outer, inner: loops, is_untrimmed });

@@ -27,7 +27,7 @@ impl Edges {
     /// Of all curves that outlines have: as they were fitted, where that was needed, else exact. O(control points).
     pub(super) fn new(shapes: &[&Shape], outlines: &[Outline], filled: &Filled) -> Self {
         let mut is_used = vec![false; shapes.len()];
-        for one in outlines.iter().flat_map(|outline| std::iter::once(&outline.outer).chain(&outline.inner)).flatten() {
+        for one in outlines.iter().flat_map(Outline::rings).flatten() {
             is_used.iter_mut().skip(one.curve).take(1).for_each(|used| *used = true);
         }
         let roots = network::joined(shapes.len(), outlines);
@@ -131,8 +131,7 @@ impl Edges {
             let all: Vec<Vec<EdgeUse>> = uses.iter().map(|one| self.uses(one)).collect::<Option<_>>()?;
             Some(all.into_iter().flatten().collect())
         };
-        let mut rings: Vec<Vec<EdgeUse>> =
-            std::iter::once(&outline.outer).chain(&outline.inner).map(ring).collect::<Option<_>>()?;
+        let mut rings: Vec<Vec<EdgeUse>> = outline.rings().map(ring).collect::<Option<_>>()?;
         if is_flipped {
             rings.iter_mut().for_each(|ring| turn(ring));
         }

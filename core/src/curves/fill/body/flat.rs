@@ -57,11 +57,21 @@ fn knots([low, high]: [f64; 2]) -> Vec<f64> {
     [low; 3].into_iter().chain(middle).chain([high; 3]).collect()
 }
 
+/// Halvings of the pieces of a curve, at most, until its control points have images: they come nearer to the curve, which has one.
+const HALVINGS: u32 = 7;
+
 /// Loops with curves of parameters whose control points are the images of those in space, with factors of their weights.
 fn mapped(edges: &Edges, rings: Vec<Vec<EdgeUse>>, map: impl Fn(Point) -> Option<[f64; 3]>) -> Option<Vec<Vec<EdgeUse>>> {
     let one = |one: EdgeUse| {
-        let curve = edges.curve(&one)?;
-        let images: Vec<[f64; 3]> = curve.points().iter().map(|point| map(*point)).collect::<Option<_>>()?;
+        let mut curve = edges.curve(&one)?.clone();
+        let images = |curve: &Spline| curve.points().iter().map(|point| map(*point)).collect::<Option<Vec<[f64; 3]>>>();
+        for _ in 0..HALVINGS {
+            if images(&curve).is_some() {
+                break;
+            }
+            curve = curve.halved().ok()?;
+        }
+        let images = images(&curve)?;
         let points = images.iter().map(|[x, y, _]| [*x, *y, 0.0]).collect();
         let is_plain = curve.weights().is_none() && images.iter().all(|[.., weight]| *weight == 1.0);
         let weight = |(at, [.., factor]): (usize, &[f64; 3])| {

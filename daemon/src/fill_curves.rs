@@ -206,7 +206,7 @@ fn name(method: Method) -> &'static str {
 
 /// A table for people.
 fn as_text(args: &FillCurvesArgs, done: &Done) -> String {
-    let Done { network, filled, left, mesh } = done;
+    let Done { network, filled, mesh, .. } = done;
     let unit = &network.unit.name;
     let outlines = Counted(filled.outlines.len() as u64, "outline", "outlines");
     let made =
@@ -242,6 +242,25 @@ fn as_text(args: &FillCurvesArgs, done: &Done) -> String {
             lines.push(format!("  lost    {} too small for single precision", words::triangles(mesh.too_small)));
         }
     }
+    let unsure = filled.filled.reports.iter().filter(|report| report.is_ambiguous).count() as u64;
+    if unsure > 0 {
+        let of = Counted(unsure, "outline", "outlines");
+        lines.push(format!(
+            "  unsure  {of}: another simple surface has the same curves, as a disc and half of a sphere have one circle"
+        ));
+    }
+    lines.extend(left_over(done));
+    if let Some(mesh) = mesh {
+        let verdict = &mesh.report.verdict;
+        lines.push(format!("  verdict {}: {}", if verdict.good { "good" } else { "not good" }, verdict.statement));
+    }
+    lines.iter().map(|line| plain(line) + "\n").collect()
+}
+
+/// What is left of the outlines and faces.
+fn left_over(done: &Done) -> Vec<String> {
+    let Done { network, filled, left, .. } = done;
+    let mut lines = Vec::new();
     for number in left.iter().take(LISTED) {
         lines.push(format!("  left    outline {number}: {}", problem(filled, *number)));
     }
@@ -252,11 +271,7 @@ fn as_text(args: &FillCurvesArgs, done: &Done) -> String {
         let more = left.len().saturating_sub(LISTED) + filled.bare.len().saturating_sub(LISTED);
         lines.push(format!("  left    {more} more; --json has all of them"));
     }
-    if let Some(mesh) = mesh {
-        let verdict = &mesh.report.verdict;
-        lines.push(format!("  verdict {}: {}", if verdict.good { "good" } else { "not good" }, verdict.statement));
-    }
-    lines.iter().map(|line| plain(line) + "\n").collect()
+    lines
 }
 
 /// A face that no curve bounds, for people.

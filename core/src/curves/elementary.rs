@@ -168,6 +168,16 @@ pub struct Told {
 }
 
 impl Told {
+    /// Whether the surface has no end, so that faces of it may have no boundary, and a boundary has a part of it on both sides.
+    pub(crate) fn is_closed(&self) -> bool {
+        matches!(self.surface, Elementary::Sphere { .. } | Elementary::Torus { .. })
+    }
+
+    /// Whether the file does not say which of both parts of it is the face.
+    pub(crate) fn is_ambiguous(&self) -> bool {
+        self.is_closed() && self.is_left.is_none()
+    }
+
     /// It behind a map that keeps angles; `None` behind any other one.
     pub(crate) fn transformed(self, map: &Affine) -> Option<Self> {
         let [x, y, z] = map.columns();

@@ -34,14 +34,14 @@ pub(super) fn outlines(network: &Network, how: &loops::Options, is_told: bool) -
         let told = face.told.filter(|_| is_told);
         let is_bounded = |uses: &[Use]| !uses.is_empty() && !is_seam(uses);
         if is_bounded(&face.outer)
-            || (face.inner.is_empty() && !face.outer.is_empty() && told.is_none_or(|told| !is_closed(told)))
+            || (face.inner.is_empty() && !face.outer.is_empty() && told.is_none_or(|told| !told.is_closed()))
         {
             all.push(Outline::from(face), told);
             continue;
         }
         // All that bounds it are holes: of a closed surface, any of them may come first.
         let mut rings = face.inner.iter().filter(|uses| is_bounded(uses)).cloned();
-        match (told.filter(|told| is_closed(*told)), rings.next()) {
+        match (told.filter(Told::is_closed), rings.next()) {
             (Some(told), Some(outer)) => all.push(Outline { outer, inner: rings.collect() }, Some(told)),
             (Some(told), None) => all.whole(told, network.curves.len()),
             _ => all.bare.push(number),
@@ -97,11 +97,6 @@ fn circle(frame: &Frame, centre: Point, axes: [Point; 2]) -> Option<Shape> {
         [0, 1, 2].map(|at| a * x[at] + b * y[at] + c * z[at])
     };
     Arc::new(frame.outside(centre), axes.map(vector), [0.0, 0.0]).map(Shape::Arc).ok()
-}
-
-/// Whether a surface has no end: faces of it may have no boundary.
-fn is_closed(told: Told) -> bool {
-    matches!(told.surface, Elementary::Sphere { .. } | Elementary::Torus { .. })
 }
 
 /// Whether each curve of a loop is passed in both directions: the seams of a whole surface.

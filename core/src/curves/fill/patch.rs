@@ -198,7 +198,7 @@ impl<'a> Task<'a> {
         let meshed = self.mesh(layout)?;
         report.method = if matches!(surface, Elementary::Plane(_)) { Method::Plane } else { Method::Recognised };
         (report.error, report.is_told, report.is_left) = (far, true, told.is_left);
-        report.is_ambiguous &= told.is_left.is_none() && !matches!(surface, Elementary::Plane(_));
+        report.is_ambiguous = told.is_ambiguous();
         Some((Surface::Carrier(surface), meshed))
     }
 

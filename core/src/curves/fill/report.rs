@@ -113,7 +113,8 @@ pub struct Report {
     pub is_told: bool,
     /// Whether the surface is to the left of its outline as seen from outside; `None` where the file did not say it.
     pub is_left: Option<bool>,
-    /// Whether other simple surfaces have the same outline: its curve is a circle, or its curves are two circles around one axis.
+    /// Whether other simple surfaces have the same outline: its curve is a circle, or its curves are two circles around one axis, and the file says no surface; or
+    /// that is a sphere or a torus, and the file does not say on which side of the outline.
     pub is_ambiguous: bool,
     /// Whether triangles run against the direction of the outline, so that they agree with those of other outlines.
     pub is_flipped: bool,

@@ -223,7 +223,7 @@ fn what_folds_is_told() {
     let tie = [[0.0, 0.0, 0.0], [1.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
     let shapes: Vec<Shape> = (0..4).map(|number| line(tie[number], tie[(number + 1) % 4])).collect();
     let result = filled(&shapes, &[outline(1..=4)], &Options::default());
-    assert_eq!((result.reports[0].method, result.reports[0].problem.clone()), (Method::Fallback, Some(Problem::Folds)));
+    assert_eq!((result.reports[0].method, result.reports[0].problem.clone()), (Method::Fallback, Some(Problem::Crosses)));
     let Surface::Fallback(rings) = &result.surfaces[0] else { panic!("{:?}", result.surfaces) };
     assert!(rings[0].len() >= 4 && rings[0].iter().all(|number| (*number as usize) < result.mesh.points.len()));
     assert!(matches!(fill(&[], &[outline([1])], &Options::default()), Err(FillError::Unknown { outline: 0, curve: 0 })));

@@ -1,12 +1,14 @@
-//! Waves that a tool may have left, where no tool path is known: the surface is cut into patches, and each is asked for a wave ([`hint`]).
+//! Waves that a tool may have left, where no tool path is known.
 //!
-//! A patch is a disc of neighbouring triangles whose smoothed normals lie around that of its first one, small enough for a dozen waves: in a
-//! larger one, a direction that is off by a degree would lose the wave. Patches beside each other with the same wave are one place.
+//! The form is taken away first: of each vertex its height over the surface that many means of neighbours make, twice over, is left; waves of some thirty edges and more go
+//! with the form. The surface is cut into patches, and each is asked for a wave of these heights, as [`super::hint`] asks for one. A patch is a disc of neighbouring
+//! triangles whose smoothed normals lie around that of its first one, small enough for a few dozen waves: in a larger one, a direction that is off by a degree would
+//! lose the wave. Patches beside each other with the same wave are one place.
 
 use super::found::Mesh;
 use super::options::{Error, Options};
 use super::regions::neighbours;
-use super::spectrum::{Hint, hint};
+use super::spectrum::{Hint, axes, search, size};
 use crate::curves::vector::{Point, add, cross, dot, plain_norm, plain_unit, scale, sub};
 use rayon::prelude::*;
 use std::collections::VecDeque;
@@ -15,11 +17,17 @@ use std::collections::VecDeque;
 const MOST: usize = 6000;
 /// Triangles of a patch, at least: fewer have no dozen of vertices on each of a few waves.
 const LEAST: usize = 200;
-/// Passes that smooth normals: about four rings of triangles, so that the flanks of a step have the normal of the wall.
+/// Passes that smooth normals and places: waves of eight edges are gone, of sixty nearly stay.
 const PASSES: usize = 64;
+/// Lengths of waves, in edges: shorter ones are no waves of a mesh, longer ones are its form.
+const EDGES: [f64; 2] = [2.5, 24.0];
+/// The height of a wave is less than this part of its pitch: steps at 45° have a half, balls less.
+const STEEPEST: f64 = 0.55;
+/// Vertices of a patch that are compared, at most.
+const SAMPLES: usize = 2000;
 /// Cosine of the angle between the smoothed normals of a patch and its first one, at least: 40°.
 const TURN: f64 = 0.766;
-/// Of the variance of a patch's height, a sine explains as much at least: scallops of balls have more than 0.8, forms less than 0.4.
+/// Of the variance of a patch's height, a sine explains as much at least.
 const SHARE: f64 = 0.6;
 /// Waves of patches beside each other are one if their pitch differs by less than this part, and their direction by less than 15°.
 const PITCH: f64 = 0.1;
@@ -55,16 +63,99 @@ pub fn suspects(mesh: Mesh<'_>, options: &Options<'_>) -> Result<Vec<Suspect>, E
     let neighbours = neighbours(mesh.points.len(), mesh.faces);
     let normals = smoothed(mesh, &neighbours, options)?;
     let (patches, numbers) = patches(mesh, (&neighbours, &normals), options);
-    let rounding = rounding(mesh);
+    let (rough, rounding) = (roughness(mesh, options)?, rounding(mesh));
     let ask = |patch: &Vec<u32>| {
         if !(options.go_on)() {
             return Err(Error::Stopped);
         }
-        let found = if patch.len() < LEAST { None } else { hint(mesh, patch)? };
-        Ok(found.filter(|hint| hint.share >= SHARE && hint.height > rounding))
+        let found = if patch.len() < LEAST { None } else { wave(mesh, &rough, patch) };
+        Ok(found.filter(|hint| hint.share >= SHARE && hint.height > rounding && hint.height < STEEPEST * hint.pitch))
     };
     let hints: Vec<Option<Hint>> = patches.par_iter().map(ask).collect::<Result<_, Error>>()?;
     Ok(places(mesh, (&patches, &numbers, &hints), &neighbours))
+}
+
+/// The strongest wave of a patch.
+fn wave(mesh: Mesh<'_>, rough: &[Point], patch: &[u32]) -> Option<Hint> {
+    let (mut normal, mut edge) = ([0.0; 3], 0.0);
+    let faces = || patch.iter().filter_map(|face| mesh.faces.get(*face as usize));
+    for face in faces() {
+        let [a, b, c] = mesh.corners(face);
+        normal = add(normal, cross(sub(b, a), sub(c, a)));
+        edge += plain_norm(sub(b, a)) / patch.len() as f64;
+    }
+    let axes = axes(plain_unit(normal)?)?;
+    let mut vertices: Vec<u32> = faces().flatten().copied().collect();
+    vertices.sort_unstable();
+    vertices.dedup();
+    let stride = vertices.len().div_ceil(SAMPLES).max(1);
+    let taken: Vec<usize> = vertices.iter().step_by(stride).map(|vertex| *vertex as usize).collect();
+    let place = |vertex: usize| mesh.points.get(vertex).map_or([0.0; 3], |point| point.map(f64::from));
+    let middle = scale(taken.iter().map(|vertex| place(*vertex)).fold([0.0; 3], add), 1.0 / taken.len().max(1) as f64);
+    let flat = |vertex: &usize| {
+        let from = sub(place(*vertex), middle);
+        let [x, y, _] = axes.map(|axis| dot(from, axis));
+        [x, y, dot(rough.get(*vertex).copied().unwrap_or_default(), axes[2])]
+    };
+    let mut list: Vec<Point> = taken.iter().map(flat).collect();
+    let mean = list.iter().map(|[_, _, z]| z).sum::<f64>() / list.len().max(1) as f64;
+    list.iter_mut().for_each(|[_, _, z]| *z -= mean);
+    let [shortest, longest] = EDGES.map(|edges| edges * edge);
+    search(&list, axes, [shortest, longest.min(2.0 * size(&list) / 4.0)])
+}
+
+/// What is left of each vertex's place when the form is taken away: it less the smoothed place, twice over.
+fn roughness(mesh: Mesh<'_>, options: &Options<'_>) -> Result<Vec<Point>, Error> {
+    let around = around(mesh);
+    let mut rough: Vec<Point> = mesh.points.par_iter().map(|point| point.map(f64::from)).collect();
+    for _ in 0..2 {
+        let mut form = rough.clone();
+        for _ in 0..PASSES {
+            if !(options.go_on)() {
+                return Err(Error::Stopped);
+            }
+            let mean = |(vertex, own): (usize, &Point)| {
+                let others = around.of(vertex);
+                let sum =
+                    others.iter().filter_map(|other| form.get(*other as usize)).fold([0.0; 3], |sum, other| add(sum, *other));
+                if others.is_empty() { *own } else { scale(add(*own, scale(sum, 1.0 / others.len() as f64)), 0.5) }
+            };
+            form = form.par_iter().enumerate().map(|(vertex, own)| mean((vertex, own))).collect();
+        }
+        rough = rough.par_iter().zip(&form).map(|(place, form)| sub(*place, *form)).collect();
+    }
+    Ok(rough)
+}
+
+/// The neighbours of each vertex, once for each triangle that goes there and on to them.
+struct Around {
+    starts: Vec<u32>,
+    lists: Vec<u32>,
+}
+
+impl Around {
+    fn of(&self, vertex: usize) -> &[u32] {
+        let ends = self.starts.get(vertex).zip(self.starts.get(vertex + 1));
+        ends.and_then(|(start, end)| self.lists.get(*start as usize..*end as usize)).unwrap_or_default()
+    }
+}
+
+/// By counting: O(triangles), 12 bytes each.
+fn around(mesh: Mesh<'_>) -> Around {
+    let sides = |[a, b, c]: &[u32; 3]| [(*a, *b), (*b, *c), (*c, *a)];
+    let mut starts = vec![0u32; mesh.points.len() + 1];
+    for (from, _) in mesh.faces.iter().flat_map(sides) {
+        starts[from as usize + 1] += 1;
+    }
+    for vertex in 0..mesh.points.len() {
+        starts[vertex + 1] += starts[vertex];
+    }
+    let (mut next, mut lists) = (starts.clone(), vec![0; mesh.faces.len() * 3]);
+    for (from, to) in mesh.faces.iter().flat_map(sides) {
+        lists[next[from as usize] as usize] = to;
+        next[from as usize] += 1;
+    }
+    Around { starts, lists }
 }
 
 /// Heights that rounding of coordinates alone can make.
@@ -179,4 +270,66 @@ fn suspect(mesh: Mesh<'_>, members: &[usize], patches: &[Vec<u32>], hints: &[Opt
     }
     let (pitch, height, confidence) = (mean(|hint| hint.pitch), mean(|hint| hint.height), mean(|hint| hint.share));
     Some(Suspect { across: largest.1.across, pitch, height, confidence, area, within, triangles })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::options::Corrections;
+    use super::*;
+
+    /// A grid of 120 by 120 cells, a quarter of a millimetre wide, at these heights.
+    fn sheet(height: impl Fn(f64, f64) -> f64) -> (Vec<[f32; 3]>, Vec<[u32; 3]>) {
+        let count = 120u32;
+        let place = |i: u32, j: u32| {
+            let (x, y) = (f64::from(i) * 0.25, f64::from(j) * 0.25);
+            [x, y, height(x, y)].map(|x| x as f32)
+        };
+        let points = (0..=count).flat_map(|j| (0..=count).map(move |i| (i, j))).map(|(i, j)| place(i, j)).collect();
+        let at = |i: u32, j: u32| j * (count + 1) + i;
+        let cells = (0..count).flat_map(|j| (0..count).map(move |i| (i, j)));
+        let pair = |(i, j): (u32, u32)| [[at(i, j), at(i + 1, j), at(i + 1, j + 1)], [at(i, j), at(i + 1, j + 1), at(i, j + 1)]];
+        (points, cells.flat_map(pair).collect())
+    }
+
+    /// Scallops of a ball of radius 3, a step of 1.5 apart, along X.
+    fn scallop(x: f64) -> f64 {
+        let off = x - (x / 1.5).round() * 1.5;
+        3.0 - (9.0 - off * off).sqrt()
+    }
+
+    fn found(height: impl Fn(f64, f64) -> f64, options: &Options<'_>) -> Vec<Suspect> {
+        let (points, faces) = sheet(height);
+        suspects(Mesh { points: &points, faces: &faces }, options).expect("a mesh")
+    }
+
+    /// Half of a hilly sheet has scallops: one place is told, which is that half, with their pitch and direction.
+    #[test]
+    fn half_a_sheet_is_one_place() {
+        let form = |x: f64, y: f64| (x / 6.0).sin() + (y / 5.0).cos();
+        let all = found(|x, y| form(x, y) + if y < 15.0 { scallop(x) } else { 0.0 }, &Options::default());
+        let [one] = &all[..] else { panic!("{all:?}") };
+        let height = 3.0 - (9.0f64 - 0.5625).sqrt();
+        assert!((one.pitch - 1.5).abs() < 0.03 && (0.7..1.1).contains(&(one.height / height)), "{} {}", one.pitch, one.height);
+        assert!(one.across[1].abs() < 0.1 && one.confidence > 0.8, "{:?} {}", one.across, one.confidence);
+        assert!(one.triangles.len() > 8000 && one.within[1][1] < 20.0, "{} {:?}", one.triangles.len(), one.within);
+        assert!(found(form, &Options::default()).is_empty());
+    }
+
+    /// Steps of a wall by a flat tool, at 45°, are waves as well; noise is none, and a sharp edge is none.
+    #[test]
+    fn steps_are_waves_and_edges_are_none() {
+        let steps = found(|x, _| (x / 1.5).floor() * 1.5, &Options::default());
+        assert!(!steps.is_empty() && steps.iter().all(|one| (one.pitch - 1.5 * 2f64.sqrt()).abs() < 0.1), "{steps:?}");
+        assert!(found(|x, _| (x - 15.0).abs(), &Options::default()).is_empty());
+        assert!(found(|x, y| 0.01 * ((x * 91.7 + y * 57.3).sin() * 43758.5).fract(), &Options::default()).is_empty());
+    }
+
+    /// Nobody looks where the corrections forbid it.
+    #[test]
+    fn excluded_places_are_not_looked_at() {
+        let exclude = [[[-1.0; 3], [31.0; 3]]];
+        let corrections = Corrections { exclude: &exclude, ..Corrections::default() };
+        assert!(found(|x, _| scallop(x), &Options { corrections, ..Options::default() }).is_empty());
+        assert_eq!(found(|x, _| scallop(x), &Options::default()).len(), 1);
+    }
 }

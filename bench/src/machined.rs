@@ -99,12 +99,12 @@ fn figures(
 ) -> serde_json::Value {
     let crests = Crests::of(moves, [[low[0], low[1]], [high[0], high[1]]], EVERY);
     let [was, is] = [crests.on(before), crests.on(after)];
-    let ([low_before, middle_before, high_before], count) = was.shares(&is, PARTS);
-    let ([low_after, middle_after, high_after], _) = is.shares(&was, PARTS);
+    let ([low_before, middle_before, high_before], count) = was.shares(&was, PARTS);
+    let ([low_after, middle_after, high_after], count_after) = is.shares(&was, PARTS);
     let residue = &told["residue"];
     serde_json::json!({
         "moves": moves.len(),
-        "places": count,
+        "places_even": [count, count_after],
         "crest_parts": PARTS,
         "crest_before": [low_before, middle_before, high_before],
         "crest_after": [low_after, middle_after, high_after],

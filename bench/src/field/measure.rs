@@ -3,11 +3,11 @@
 use super::path::Move;
 use crate::space::{Vector, wide};
 
-/// Places where a crest may be: halfway between two neighbouring passes along X, with the passes beside it.
+/// Places where a crest may be: halfway between the middle ones of four neighbouring passes along X.
 #[derive(Clone, Debug)]
 pub struct Crests {
-    /// X, and Y of the pass before, of the crest, of the pass behind.
-    places: Vec<(f64, [f64; 3])>,
+    /// X, and Y of the four passes.
+    places: Vec<(f64, [f64; 4])>,
 }
 
 /// Heights of a mesh at these places: how far each crest stands over the middle between the passes beside it.
@@ -15,12 +15,16 @@ pub struct Crests {
 pub struct Heights {
     /// For each place; none where the mesh has no height, or a wall is.
     pub at: Vec<Option<f64>>,
+    /// For each place, whether the four passes lie on a slope that hardly bends, so that the form adds nothing to the crest.
+    pub is_even: Vec<bool>,
 }
 
 /// Passes that differ by less are one, in millimetres.
 const SAME: f64 = 1e-4;
 /// Passes of which one is higher than the other by more than this part of the way between them have a wall there, which no crest stands on.
 const STEEP: f64 = 0.36;
+/// Second differences of the heights of passes on a slope that hardly bends, in millimetres: the form is an eighth of that at a crest.
+const BENT: f64 = 0.004;
 
 impl Crests {
     /// Within a rectangle, so far apart along X. Passes are those Y at which moves go along X alone.
@@ -31,10 +35,10 @@ impl Crests {
         passes.dedup_by(|a, b| *a - *b < SAME);
         let count = ((high[0] - low[0]) / every).floor().max(0.0) as usize;
         let mut places = Vec::new();
-        for pair in passes.windows(2).filter(|pair| pair[0] > low[1] && pair[1] < high[1]) {
+        for four in passes.array_windows::<4>().filter(|four| four[0] > low[1] && four[3] < high[1]) {
             // A little beside edges of the grid, where a height is that of two triangles.
             let x = |n: usize| low[0] + (n as f64 + 0.37) * every;
-            places.extend((0..count).map(|n| (x(n), [pair[0], 0.5 * (pair[0] + pair[1]), pair[1]])));
+            places.extend((0..count).map(|n| (x(n), *four)));
         }
         Self { places }
     }
@@ -43,20 +47,25 @@ impl Crests {
     pub fn on(&self, triangles: &[[[f32; 3]; 3]]) -> Heights {
         let grid = Grid::of(triangles);
         let height = |x: f64, y: f64| grid.height(triangles, [x, y]);
-        let at = |(x, [before, crest, behind]): &(f64, [f64; 3])| {
+        let at = |(x, [_, before, behind, _]): &(f64, [f64; 4])| {
             let [low, high] = [height(*x, *before)?, height(*x, *behind)?];
             let is_wall = (low - high).abs() > STEEP * (behind - before);
-            if is_wall { None } else { Some(height(*x, *crest)? - 0.5 * (low + high)) }
+            if is_wall { None } else { Some(height(*x, 0.5 * (before + behind))? - 0.5 * (low + high)) }
         };
-        Heights { at: self.places.iter().map(at).collect() }
+        let is_even = |(x, passes): &(f64, [f64; 4])| {
+            let [a, b, c, d] = passes.map(|y| height(*x, y).unwrap_or(f64::NAN));
+            (a - 2.0 * b + c).abs() < BENT && (b - 2.0 * c + d).abs() < BENT
+        };
+        Heights { at: self.places.iter().map(at).collect(), is_even: self.places.iter().map(is_even).collect() }
     }
 }
 
 impl Heights {
-    /// The values of which these parts lie below, of the places that both have; and how many these are.
-    pub fn shares(&self, other: &Self, parts: [f64; 3]) -> ([f64; 3], usize) {
-        let both = self.at.iter().zip(&other.at).filter(|(_, other)| other.is_some());
-        let mut values: Vec<f64> = both.filter_map(|(own, _)| *own).collect();
+    /// The values of which these parts lie below, at places that are even on a mesh before; and how many these are.
+    pub fn shares(&self, before: &Self, parts: [f64; 3]) -> ([f64; 3], usize) {
+        let even =
+            self.at.iter().zip(&before.at).zip(&before.is_even).filter(|((_, before), is_even)| before.is_some() && **is_even);
+        let mut values: Vec<f64> = even.filter_map(|((own, _), _)| *own).collect();
         values.sort_unstable_by(f64::total_cmp);
         let at = |part: f64| values.get((values.len() as f64 * part) as usize).or(values.last()).copied().unwrap_or(f64::NAN);
         (parts.map(at), values.len())
@@ -126,6 +135,10 @@ mod tests {
     use super::super::heights::{Field, Stock};
     use super::*;
 
+    fn bend([x, y, z]: Vector) -> Vector {
+        [x, y, z - 0.05 * (y - 1.5) * (y - 1.5)]
+    }
+
     /// Passes of a ball of radius 1, half a millimetre apart, leave crests of 1 − √(1 − 1/16); where only the stock's top is, there is none.
     #[test]
     fn crests_have_the_height_that_the_tool_leaves() {
@@ -140,12 +153,17 @@ mod tests {
         let heights = crests.on(&field);
         let ([low, middle, high], count) = heights.shares(&heights, [0.0, 0.5, 1.0]);
         let exact = 1.0 - (1.0f64 - 1.0 / 16.0).sqrt();
-        assert_eq!(count, 6 * 8);
+        // Of seven passes, the middle ones of each four have four gaps; eight places in each.
+        assert_eq!(count, 4 * 8);
         assert!(
             (low - exact).abs() < 1e-6 && (middle - exact).abs() < 1e-6 && (high - exact).abs() < 1e-6,
             "{low} {middle} {high}"
         );
         let flat = Crests::of(&moves, [[0.0, -0.1], [4.0, 3.1]], 0.5).on(&Field::cut(stock, 0.125, 1.0, &[]).triangles());
-        assert_eq!(flat.shares(&heights, [0.0, 0.5, 1.0]), ([0.0; 3], 48));
+        assert_eq!(flat.shares(&heights, [0.0, 0.5, 1.0]), ([0.0; 3], 32));
+        // A hill under the passes bends the slope: nothing is even there.
+        let bent: Vec<Move> = moves.iter().map(|one| Move { from: bend(one.from), to: bend(one.to), ..*one }).collect();
+        let hill = Crests::of(&bent, [[0.0, -0.1], [4.0, 3.1]], 0.5).on(&Field::cut(stock, 0.125, 1.0, &bent).triangles());
+        assert!(hill.is_even.iter().all(|is_even| !is_even));
     }
 }

@@ -127,7 +127,7 @@ fn shares(list: &[Point], angle: f64, (low, step, count): (f64, f64, usize)) -> 
 }
 
 /// Takes the least-squares parabolic surface away from heights; `None` if the places do not determine one.
-fn flatten(list: &mut [Point], size: f64) -> Option<()> {
+pub(super) fn flatten(list: &mut [Point], size: f64) -> Option<()> {
     let terms = |[x, y, _]: &Point| {
         let (x, y) = (x / size, y / size);
         [1.0, x, y, x * x, x * y, y * y]

@@ -175,7 +175,7 @@ fn waves_without_a_path_are_told_and_left() {
     let number = |name: &str| suspect[name].as_f64().unwrap();
     assert!((number("pitch") / case().step - 1.0).abs() < 0.03, "{suspect}");
     assert!((0.8..1.1).contains(&(number("height") / part.height)), "{suspect} of {}", part.height);
-    assert!(suspect["across"][0].as_f64().unwrap().abs() > 0.998 && number("confidence") > 0.8, "{suspect}");
+    assert!(suspect["across"][0].as_f64().unwrap().abs() > 0.998 && number("confidence") > 0.7, "{suspect}");
     assert!(place.read("out.stl") == place.read("in.stl"));
     let said = place.suture(["residue", "in.stl", "-o", "two.stl", "--without-path"]).expect(1).stdout();
     assert!(said.contains("1 place with periodic waves, left as they are") && said.contains("apart across (1.00"), "{said}");

@@ -137,8 +137,8 @@ fn level(list: &mut Vec<Point>) -> Option<()> {
     (4 * list.len() >= 3 * all).then_some(())
 }
 
-/// The height of the mean wave: all waves laid upon each other, the medians of parts of the wave. None if places lie on few parts of it, or on few waves, so that
-/// a wave between them is not seen but guessed.
+/// The height of the mean wave: all waves laid upon each other, the medians of parts of the wave. None if places lie on less than half of its parts, or on few waves, so
+/// that a wave between them is not seen but guessed; a grid that fits the wave lies on four parts or more.
 fn folded(list: &[Point], axes: [Point; 3], hint: &Hint) -> Option<f64> {
     let [across, along] = [0, 1].map(|axis| dot(hint.across, axes[axis]));
     let place = |[x, y, _]: &Point| (x * across + y * along) / hint.pitch;
@@ -148,8 +148,9 @@ fn folded(list: &[Point], axes: [Point; 3], hint: &Hint) -> Option<f64> {
         let part = ((place(point) - low).fract() * FOLDS as f64) as usize;
         parts.get_mut(part)?.push(point[2]);
     }
-    let least = list.len() / FOLDS / 4;
-    if high - low < WAVES || parts.iter().any(|part| part.len() < least.max(1)) {
+    let least = (list.len() / FOLDS / 4).max(1);
+    parts.retain(|part| part.len() >= least);
+    if high - low < WAVES || 2 * parts.len() < FOLDS {
         return None;
     }
     let mut heights: Vec<f64> = Vec::with_capacity(FOLDS);
@@ -343,7 +344,7 @@ mod tests {
         let height = 3.0 - (9.0f64 - 0.5625).sqrt();
         assert!((one.pitch - 1.5).abs() < 0.03 && (0.8..1.1).contains(&(one.height / height)), "{} {}", one.pitch, one.height);
         assert!(one.across[1].abs() < 0.1 && one.confidence > 0.6, "{:?} {}", one.across, one.confidence);
-        assert!(one.triangles.len() > 8000 && one.within[1][1] < 20.0, "{} {:?}", one.triangles.len(), one.within);
+        assert!(one.triangles.len() > 5000 && one.within[1][1] < 16.0, "{} {:?}", one.triangles.len(), one.within);
         assert!(found(form, &Options::default()).is_empty());
     }
 

@@ -138,8 +138,8 @@ mod tests {
                     if left < 0.0 { f64::INFINITY } else { tip[2] + 1.0 - left.sqrt() }
                 });
                 let (least, found) = (sampled.fold(f64::INFINITY, f64::min), under(1.0, &one, place));
-                // At the rim of the ball the height is steep: samples miss up to a part of it.
-                assert!(found <= least + 1e-12, "{place:?}: {found} {least}");
+                // At the rim of the ball the height is steep: samples miss up to a part of it, and a rounding of 1e-16 is one of 1e-8 under the root.
+                assert!(found <= least + 1e-7, "{place:?}: {found} {least}");
                 assert!(least - found < 0.02 || least.is_infinite(), "{place:?}: {found} {least}");
             }
         }

@@ -27,13 +27,15 @@ class Stages:
         self.last = now
 
 
-def run(repair, *flags):
-    """Calls `repair(source, target, stages, **flags)` for the input, or for each of a folder; a failure is named, then the next."""
+def run(repair, *flags, values=()):
+    """Calls `repair(source, target, stages, **flags, **values)` for the input, or for each of a folder; a failure is named, then the next."""
     parser = argparse.ArgumentParser()
     parser.add_argument("source", type=pathlib.Path)
     parser.add_argument("target", type=pathlib.Path)
     for flag in flags:
         parser.add_argument("--" + flag, action="store_true")
+    for value in values:
+        parser.add_argument("--" + value, required=True)
     chosen = vars(parser.parse_args())
     source, target = chosen.pop("source"), chosen.pop("target")
     files = [(source, target)]

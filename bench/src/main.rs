@@ -3,8 +3,11 @@
 mod compare;
 mod holes;
 mod judging;
+mod machined;
 mod mesh;
 mod picture;
+mod publishing;
+mod simplify_choices;
 mod which;
 
 use std::error::Error;
@@ -14,6 +17,8 @@ use std::time::Duration;
 
 use clap::{Args, Parser, Subcommand};
 use compare::{Cache, Options, Side};
+use publishing::{Closing, closing, command, publish};
+use simplify_choices::SimplifyChoices;
 use suture_bench::generate::{self, Case, Density};
 use which::Which;
 
@@ -128,6 +133,10 @@ enum Task {
         #[command(flatten)]
         options: Closing,
     },
+    /// Simulate the workpiece of a G-code file as a height field, have suture remove what the tool left, measure and draw it.
+    Machined(machined::Options),
+    /// Measure how fast suture and its peers make triangles fewer, and how near the rest is, and publish it.
+    Simplify(SimplifyChoices),
     /// Load one OBJ by tobj, and print the seconds as JSON: a process that `formats` measures.
     #[command(hide = true)]
     LoadObj { file: PathBuf },
@@ -225,19 +234,6 @@ struct Meaning {
 }
 
 #[derive(Args)]
-struct Closing {
-    /// The folder of raw files, instead of this crate's `results`. Page and plots are then put there, too.
-    #[arg(long, value_name = "DIR")]
-    results: Option<PathBuf>,
-    /// Measure this binary instead of building one.
-    #[arg(long)]
-    suture: Option<PathBuf>,
-    /// Seconds after which a process is killed.
-    #[arg(long, default_value_t = 300)]
-    limit: u64,
-}
-
-#[derive(Args)]
 struct Formats {
     /// About how many triangles the mesh has, or several meshes.
     #[arg(long, value_delimiter = ',', default_value = "5000000")]
@@ -303,6 +299,8 @@ fn main() -> ExitCode {
         Task::Curves { sizes, runs, options } => {
             closing(options, "curves", false, |options| compare::outlines::outlines(options, &sizes, runs))
         }
+        Task::Machined(options) => machined::machined(&options).map(|()| ExitCode::SUCCESS),
+        Task::Simplify(choices) => choices.measure(),
         Task::LoadObj { file } => load_obj(&file),
         Task::Publish(Publish { results, check: true }) => check(results.as_deref()),
         Task::Publish(choices) => publish(choices.results.as_deref()).map(|()| ExitCode::SUCCESS),
@@ -321,26 +319,6 @@ fn name_and_size<T: std::str::FromStr<Err: std::fmt::Display>>(text: &str) -> Re
 fn generate_file(case: Case, density: Density, triangles: u64, out: &Path, seed: u64) -> Result<ExitCode, Box<dyn Error>> {
     let truth = generate::write_file_at(case, density, triangles, seed, out)?;
     println!("{:#?}\ninjected: {:#?}\nvolume: {}", truth.counts, truth.injected, truth.volume);
-    Ok(ExitCode::SUCCESS)
-}
-
-/// Makes the raw file `name`, then the page.
-fn closing(
-    choices: Closing,
-    name: &str,
-    resume: bool,
-    run: impl FnOnce(&compare::closing::Options) -> Result<(), compare::Error>,
-) -> Result<ExitCode, Box<dyn Error>> {
-    let folder = choices.results.clone().unwrap_or_else(compare::results);
-    run(&compare::closing::Options {
-        raw: folder.join(format!("{name}.jsonl")),
-        plots: choices.results.as_deref().unwrap_or(compare::home()).join("plots"),
-        suture: choices.suture,
-        resume,
-        limit: Duration::from_secs(choices.limit),
-        command: command(),
-    })?;
-    publish(choices.results.as_deref())?;
     Ok(ExitCode::SUCCESS)
 }
 
@@ -421,12 +399,6 @@ fn write_meant(folder: &Path, which: &Which) -> Result<ExitCode, Box<dyn Error>>
     Ok(ExitCode::SUCCESS)
 }
 
-/// The command line as it is published.
-fn command() -> String {
-    let words: Vec<_> = std::env::args().skip(1).map(without_place).collect();
-    format!("cargo run --release -p suture-bench -- {}", words.join(" "))
-}
-
 fn compare_all(choices: Compare) -> Result<ExitCode, Box<dyn Error>> {
     let folder = choices.results.clone().unwrap_or_else(compare::results);
     let elsewhere = !choices.files.is_empty();
@@ -457,23 +429,6 @@ fn compare_all(choices: Compare) -> Result<ExitCode, Box<dyn Error>> {
     compare::compare(&options)?;
     publish(choices.results.as_deref())?;
     Ok(ExitCode::SUCCESS)
-}
-
-/// A word of the command line as it is published: of an absolute path only the name, since the rest is this machine's own.
-fn without_place(word: String) -> String {
-    let path = Path::new(&word);
-    match path.file_name() {
-        Some(name) if path.is_absolute() => name.to_string_lossy().into_owned(),
-        _ => word,
-    }
-}
-
-/// Publishes this crate's raw runs, or others where they are.
-fn publish(results: Option<&Path>) -> Result<(), Box<dyn Error>> {
-    let (raw, into, readme) = compare::places(results);
-    compare::publish(&raw, &into, readme.as_deref())?;
-    println!("results are in {}", into.join("RESULTS.md").display());
-    Ok(())
 }
 
 fn check(results: Option<&Path>) -> Result<ExitCode, Box<dyn Error>> {

@@ -56,7 +56,7 @@ impl FromStr for Size {
 
 /// Numbers with commas between them.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Numbers<const N: usize>([f64; N]);
+pub(crate) struct Numbers<const N: usize>(pub(crate) [f64; N]);
 
 impl<const N: usize> FromStr for Numbers<N> {
     type Err = String;
@@ -71,6 +71,11 @@ impl Options {
     /// For a page: near by with all edges, a whole body without them.
     pub(crate) fn for_page(files: Vec<PathBuf>, eye: [f64; 2], at: Option<[f64; 4]>) -> Self {
         Self { files, size: Size(340, 300), boundary: true, edges: at.is_some(), eye: Numbers(eye), at: at.map(Numbers) }
+    }
+
+    /// Two panels to be looked at by themselves, with edges where only a part is drawn.
+    pub(crate) fn large(files: Vec<PathBuf>, eye: [f64; 2], at: Option<Numbers<4>>) -> Self {
+        Self { files, size: Size(900, 700), boundary: true, edges: at.is_some(), eye: Numbers(eye), at }
     }
 }
 

@@ -359,8 +359,9 @@ impl Slot {
             Err(reason) => return Worked::Step(Step::Wait { reason }),
         };
         let settle = config.settle.unwrap_or(Rest::by_default(false, context.once).settle);
-        let toolpath = match beside::of_job(&profile, (folder, job), &folder.work(claim.token), (context.world.wall(), settle)) {
-            Ok(toolpath) => toolpath,
+        let companions = match beside::of_job(&profile, (folder, job), &folder.work(claim.token), (context.world.wall(), settle))
+        {
+            Ok(companions) => companions,
             Err(reason) => return Worked::Step(Step::Wait { reason }),
         };
         if let Some(copied) = self.copied(&config, folder, claim, job, claimed, &profile) {
@@ -372,7 +373,7 @@ impl Slot {
                 Ok(worker) => worker,
                 Err(error) => return Worked::Step(Step::Wait { reason: format!("a worker process cannot be started: {error}") }),
             };
-        let request = request(folder, claim, job, (profile, toolpath), limits);
+        let request = request(folder, claim, job, (profile, companions), limits);
         let asked = Cell::new(context.world.steady());
         let lease = Cell::new(Lease::Held);
         let stop = || {
@@ -417,8 +418,9 @@ impl Slot {
         claimed: &Claimed,
         profile: &Profile,
     ) -> Option<Worked> {
-        // Another tool path of the same name makes another result.
-        let has_path = !profile.residue.toolpath.is_empty();
+        // Another tool path, brush or mask of the same name makes another result.
+        let residue = &profile.residue;
+        let has_path = [&residue.toolpath, &residue.brush, &residue.mask].into_iter().any(|name| !name.is_empty());
         if has_path || !config.reuse || job.retried.is_some() || is_forced(&job.source.path) {
             return None;
         }

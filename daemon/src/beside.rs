@@ -1,8 +1,8 @@
-//! The tool path that a profile names for a mesh: a file, or, by a name with a `*`, the one beside the mesh that has the mesh's name in the
-//! star's place (`*.nc` for `part.stl` is `part.nc`).
+//! The files that a profile names for a mesh beside the mesh itself: its tool path, a brush and a mask that correct what is residue. Each is a file,
+//! or, by a name with a `*`, the one beside the mesh that has the mesh's name in the star's place (`*.nc` for `part.stl` is `part.nc`).
 //!
-//! **In:** a profile, and where the mesh lies. **Out:** where the path is to be read, and how it is called; or why the mesh is to wait.
-//! **Promise:** a path of a hot folder is copied into the attempt's own folder, since a worker reaches nothing else; it is never changed nor moved.
+//! **In:** a profile, and where the mesh lies. **Out:** where these files are to be read, and how they are called; or why the mesh is to wait.
+//! **Promise:** a file of a hot folder is copied into the attempt's own folder, since a worker reaches nothing else; it is never changed nor moved.
 
 use std::ffi::{OsStr, OsString};
 use std::io;
@@ -11,7 +11,7 @@ use std::path::{Component, Path, PathBuf};
 use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
-use suture_core::Profile;
+use suture_core::{Profile, Report, ResidueSettings};
 use suture_store::{Job, Time};
 
 use crate::claim::Original;
@@ -20,49 +20,129 @@ use crate::folder::Folder;
 use crate::fsx::{self, Identity};
 use crate::writers::Writers;
 
-/// The name of a path's copy, before its own ending.
-const COPY: &str = "toolpath";
-
-/// A tool path for one mesh.
+/// A file for one mesh.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub(crate) struct Toolpath {
+pub(crate) struct Companion {
+    role: Role,
     /// Where it is to be read.
-    pub at: PathBuf,
+    at: PathBuf,
     /// Its name as people know it.
-    pub shown: String,
+    shown: String,
 }
 
-/// The tool path of a mesh on the command line; `None` where the profile names no star.
-pub(crate) fn of_command(profile: &Profile, mesh: &Path) -> Option<Toolpath> {
-    let pattern = &profile.residue.toolpath;
-    let at = pattern.contains('*').then(|| beside(pattern, mesh))?;
-    Some(Toolpath { shown: at.display().to_string(), at })
+/// The setting of a profile that names it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+enum Role {
+    Toolpath,
+    Brush,
+    Mask,
 }
 
-/// The tool path of a job's mesh, copied into `work`; `None` where its profile names none. A path that is not there, or still being written, is waited for as long as the
+impl Role {
+    const ALL: [Self; 3] = [Self::Toolpath, Self::Brush, Self::Mask];
+
+    fn words(self) -> &'static str {
+        match self {
+            Self::Toolpath => "tool path",
+            Self::Brush => "brush",
+            Self::Mask => "mask",
+        }
+    }
+
+    /// The name of its copy, before its own ending.
+    fn copy(self) -> &'static str {
+        match self {
+            Self::Toolpath => "toolpath",
+            Self::Brush => "brush",
+            Self::Mask => "mask",
+        }
+    }
+
+    fn setting(self, of: &mut ResidueSettings) -> &mut String {
+        match self {
+            Self::Toolpath => &mut of.toolpath,
+            Self::Brush => &mut of.brush,
+            Self::Mask => &mut of.mask,
+        }
+    }
+
+    /// As the profile names it; empty where residue is not asked for.
+    fn pattern(self, profile: &Profile) -> &str {
+        let of = &profile.residue;
+        match self {
+            Self::Toolpath => &of.toolpath,
+            _ if of.toolpath.is_empty() && !of.without_path => "",
+            Self::Brush => &of.brush,
+            Self::Mask => &of.mask,
+        }
+    }
+}
+
+/// Lets a profile name these files where they are to be read.
+pub(crate) fn put(companions: &[Companion], profile: &mut Profile) {
+    for companion in companions {
+        if let Some(path) = companion.at.to_str() {
+            *companion.role.setting(&mut profile.residue) = path.into();
+        }
+    }
+}
+
+/// Lets a report name these files as people know them, as its profile did before.
+pub(crate) fn take_back(companions: &[Companion], profile: &Profile, report: &mut Report) {
+    report.profile.residue.clone_from(&profile.residue);
+    let Some(why) = report.residue.as_mut().and_then(|residue| residue.why_not.as_mut()) else { return };
+    for companion in companions {
+        *why = why.replace(&*companion.at.to_string_lossy(), &companion.shown);
+    }
+}
+
+/// The files of a mesh on the command line whose names have a star.
+pub(crate) fn of_command(profile: &Profile, mesh: &Path) -> Vec<Companion> {
+    let of = |role: Role| {
+        let at = Some(role.pattern(profile)).filter(|pattern| pattern.contains('*')).map(|pattern| beside(pattern, mesh))?;
+        Some(Companion { role, shown: at.display().to_string(), at })
+    };
+    Role::ALL.into_iter().filter_map(of).collect()
+}
+
+/// The files of a job's mesh, copied into `work`; none where its profile names none. A file that is not there, or still being written, is waited for as long as the
 /// profile says, from when the job was there; then the mesh is worked on, and its report says what is missing. `settle`: how long a file must rest.
 ///
 /// # Errors
 /// A line for people: why the job is to wait.
 pub(crate) fn of_job(
     profile: &Profile,
+    of: (&Folder, &Job),
+    work: &Path,
+    times: (Time, Duration),
+) -> Result<Vec<Companion>, String> {
+    let named = Role::ALL.into_iter().filter(|role| !role.pattern(profile).is_empty());
+    named.map(|role| copied(role, profile, of, work, times)).collect()
+}
+
+/// One of them, copied.
+fn copied(
+    role: Role,
+    profile: &Profile,
     (folder, job): (&Folder, &Job),
     work: &Path,
     (now, settle): (Time, Duration),
-) -> Result<Option<Toolpath>, String> {
-    let pattern = &profile.residue.toolpath;
-    if pattern.is_empty() {
-        return Ok(None);
-    }
+) -> Result<Companion, String> {
+    let (pattern, words) = (role.pattern(profile), role.words());
     let leads_out = |part: Component<'_>| matches!(part, Component::ParentDir);
     let is_absolute = Path::new(pattern).is_absolute();
     if Path::new(pattern).components().any(leads_out) || !(is_absolute || pattern.contains('*')) {
         let advice = "name an absolute path, or a name beside the mesh with `*` for the mesh's own";
-        return Err(format!("its profile's tool path, `{pattern}`, is no file that a hot folder can find: {advice}"));
+        return Err(format!("its profile's {words}, `{pattern}`, is no file that a hot folder can find: {advice}"));
+    }
+    if role == Role::Mask && !is_absolute {
+        let advice = "name an absolute path outside of it, where a `*` is the mesh's own name";
+        return Err(format!("its profile's mask, `{pattern}`, is a mesh that the hot folder would repair itself: {advice}"));
     }
     let from = beside(pattern, &folder.inbox().join(job.source.path.to_path()));
     let shown = if is_absolute { from.display().to_string() } else { name(&from) };
-    let mut own = OsString::from(COPY);
+    let mut own = OsString::from(role.copy());
     if let Some(ending) = from.extension() {
         own.push(".");
         own.push(ending);
@@ -70,18 +150,20 @@ pub(crate) fn of_job(
     let at = work.join(own);
     let waited = now.0.saturating_sub(job.retried.unwrap_or(job.submitted).0);
     let is_patient = (waited as f64) < 60_000.0 * profile.residue.wait_minutes;
+    // A job that waited for another file has a copy of this one already.
+    fsx::remove_if_there(&at).map_err(|error| format!("{shown}, its {words}: an older copy stays: {error}"))?;
     match copy(&from, &at, (now, settle)) {
         Ok(true) => {}
-        Ok(false) if is_patient => return Err(format!("{shown}, its tool path, is still being written")),
+        Ok(false) if is_patient => return Err(format!("{shown}, its {words}, is still being written")),
         Err(error) if error.kind() == io::ErrorKind::NotFound && is_patient => {
-            return Err(format!("{shown}, its tool path, is not beside it yet"));
+            return Err(format!("{shown}, its {words}, is not beside it yet"));
         }
         // The worker's report says that it is not there.
         Ok(false) => {}
         Err(error) if error.kind() == io::ErrorKind::NotFound => {}
-        Err(error) => return Err(format!("{shown}, its tool path, cannot be read: {error}")),
+        Err(error) => return Err(format!("{shown}, its {words}, cannot be read: {error}")),
     }
-    Ok(Some(Toolpath { at, shown }))
+    Ok(Companion { role, at, shown })
 }
 
 /// Copies a file that is at rest; false if it is not.

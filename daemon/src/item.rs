@@ -101,7 +101,7 @@ impl Order<'_> {
             shown_input: input.display().to_string(),
             shown_output: None,
             profile: self.profile.clone(),
-            toolpath: beside::of_command(&self.profile, input),
+            companions: beside::of_command(&self.profile, input),
             limits,
         };
         let (mut output, mut report) = (None, None);

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use suture_core::report::Task;
 use suture_core::{ErrorClass, Limits, Profile, Report};
 
-use crate::beside::Toolpath;
+use crate::beside::Companion;
 use crate::fsx::Identity;
 
 /// One file to work on.
@@ -38,8 +38,8 @@ pub(crate) struct Request {
     /// The output's name as people will know it.
     pub shown_output: Option<String>,
     pub profile: Profile,
-    /// The tool path to read instead of what the profile names.
-    pub toolpath: Option<Toolpath>,
+    /// Files to read instead of what the profile names.
+    pub companions: Vec<Companion>,
     pub limits: Limits,
 }
 
@@ -125,7 +125,7 @@ mod tests {
             shown_input: "x".into(),
             shown_output: None,
             profile: Profile::default(),
-            toolpath: None,
+            companions: Vec::new(),
             limits: Limits::default(),
         };
         let line = serde_json::to_string(&request).unwrap();

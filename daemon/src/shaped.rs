@@ -1,6 +1,6 @@
 //! Words for the shaping of a repaired mesh: residue of tools, smoothing, fewer triangles. Tables and pages say the same.
 
-use suture_core::report::{Report, Residue, Simplified, Smoothed};
+use suture_core::report::{Report, Residue, ResidueSuspect, Simplified, Smoothed};
 use suture_core::words::Counted;
 
 use crate::units::{show_count, show_number};
@@ -17,6 +17,9 @@ pub(crate) fn lines(report: &Report) -> Vec<(&'static str, String)> {
 }
 
 fn residue(told: &Residue) -> Vec<(&'static str, String)> {
+    if let Some(suspects) = &told.suspects {
+        return suspected(suspects);
+    }
     let mut lines = Vec::new();
     let regions = Counted(told.regions.len() as u64, "region", "regions");
     lines.push(match &told.why_not {
@@ -51,6 +54,34 @@ fn residue(told: &Residue) -> Vec<(&'static str, String)> {
         lines.push(("", format!("{} more, listed in the report", show_count((told.regions.len() - LISTED) as u64))));
     }
     lines.extend(told.findings.iter().map(|finding| ("", format!("tool path, {finding}"))));
+    lines
+}
+
+/// Places that may be residue.
+fn suspected(suspects: &[ResidueSuspect]) -> Vec<(&'static str, String)> {
+    let count = Counted(suspects.len() as u64, "place", "places");
+    let mut lines = vec![match suspects {
+        [] => ("residue", "no periodic waves found".to_owned()),
+        _ => ("residue", format!("{count} with periodic waves, left as they are")),
+    }];
+    for suspect in suspects.iter().take(LISTED) {
+        let axes = |numbers: [f64; 3]| numbers.map(show_number).join(", ");
+        let [low, high] = suspect.within.map(axes);
+        lines.push((
+            "",
+            format!(
+                "waves {} high, {} apart across ({}), on {} within {low} : {high} ({:.0} % sure)",
+                show_number(suspect.height),
+                show_number(suspect.pitch),
+                suspect.across.map(|x| format!("{x:.2}")).join(", "),
+                Counted(suspect.triangles, "triangle", "triangles"),
+                suspect.confidence * 100.0
+            ),
+        ));
+    }
+    if suspects.len() > LISTED {
+        lines.push(("", format!("{} more, listed in the report", show_count((suspects.len() - LISTED) as u64))));
+    }
     lines
 }
 

@@ -4,7 +4,8 @@
 use std::path::Path;
 
 use suture_core::report::Certificate;
-use suture_core::{OutputFormat, Profile};
+use suture_core::residue::Brush;
+use suture_core::{OutputFormat, Profile, ResidueSettings};
 
 use crate::batch::Batch;
 use crate::cli::meshes::{DefeatureArgs, InspectArgs, RepairArgs, ResidueArgs, SimplifyArgs, SmoothArgs};
@@ -71,17 +72,44 @@ pub(crate) fn smooth(args: &SmoothArgs) -> Exit {
 /// Repairs every input, and removes the residue of a tool.
 pub(crate) fn residue(args: &ResidueArgs) -> Exit {
     repair_under(&args.repair, |profile| {
-        if let Some(path) = &args.toolpath {
-            let text = path.to_str().ok_or_else(|| format!("{}: its name is no text", path.display()))?;
-            profile.residue.toolpath = text.into();
+        let settings = &mut profile.residue;
+        for (given, setting) in
+            [(&args.toolpath, &mut settings.toolpath), (&args.brush, &mut settings.brush), (&args.mask, &mut settings.mask)]
+        {
+            if let Some(path) = given {
+                *setting = path.to_str().ok_or_else(|| format!("{}: its name is no text", path.display()))?.into();
+            }
         }
-        profile.residue.tools.extend(args.tools.iter().cloned());
-        profile.residue.tolerance_mm = args.tolerance.unwrap_or(profile.residue.tolerance_mm);
-        profile.residue.include.extend(&args.include);
-        profile.residue.exclude.extend(&args.exclude);
-        let help = "give --toolpath, or a profile that says it";
-        if profile.residue.toolpath.is_empty() { Err(format!("no tool path is named: {help}")) } else { Ok(()) }
+        corrections(settings)?;
+        settings.tools.extend(args.tools.iter().cloned());
+        settings.tolerance_mm = args.tolerance.unwrap_or(settings.tolerance_mm);
+        settings.include.extend(&args.include);
+        settings.exclude.extend(&args.exclude);
+        if args.without_path {
+            settings.toolpath.clear();
+            settings.without_path = true;
+        }
+        let is_wanted = !settings.toolpath.is_empty() || settings.without_path;
+        let help = "give --toolpath, or a profile that says it; or --without-path, to be told where waves are";
+        if is_wanted { Ok(()) } else { Err(format!("no tool path is named: {help}")) }
     })
+}
+
+/// Looks at files of corrections before any work begins; those with a star are of each mesh, and looked at with it.
+fn corrections(settings: &ResidueSettings) -> Result<(), String> {
+    let is_one = |path: &&String| !path.is_empty() && !path.contains('*');
+    let unread = |path: &str, error: std::io::Error| format!("{path}: cannot be read: {error}");
+    if let Some(path) = Some(&settings.brush).filter(is_one) {
+        let text = std::fs::read(path).map_err(|error| unread(path, error))?;
+        Brush::parse(&text).map_err(|error| format!("{path}: {error}"))?;
+    }
+    if let Some(path) = Some(&settings.mask).filter(is_one) {
+        let is_file = std::fs::File::open(path).and_then(|file| file.metadata()).map_err(|error| unread(path, error))?.is_file();
+        if !is_file {
+            return Err(format!("{path}: is no file"));
+        }
+    }
+    Ok(())
 }
 
 /// Repairs every input under the profile of the command line, which `change` changes.

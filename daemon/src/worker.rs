@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 use suture_core::report::Task;
 use suture_core::{Access, Error, ErrorClass, Progress, Report};
 
+use crate::beside;
 use crate::cli::WorkerArgs;
 use crate::confine;
 use crate::create;
@@ -126,18 +127,12 @@ fn work(request: &Request) -> suture_core::error::Result<Report> {
     limits.access = access;
     let limits = &limits;
     let mut own = profile.clone();
-    if let Some(path) = request.toolpath.as_ref().and_then(|path| path.at.to_str()) {
-        own.residue.toolpath = path.into();
-    }
+    beside::put(&request.companions, &mut own);
     let mut report = match (request.task, &request.output) {
         (Task::Repair, Some(output)) => suture_core::repair(input, output, &own, limits, &teller)?,
         _ => suture_core::inspect(input, &own, limits, &teller)?,
     };
-    if let Some(path) = &request.toolpath {
-        report.profile.residue.toolpath.clone_from(&profile.residue.toolpath);
-        let why = report.residue.as_mut().and_then(|residue| residue.why_not.as_mut());
-        why.into_iter().for_each(|why| *why = why.replace(&*path.at.to_string_lossy(), &path.shown));
-    }
+    beside::take_back(&request.companions, profile, &mut report);
     report.input.path = request.shown_input.clone().into();
     if let (Some(facts), Some(shown)) = (&mut report.output, &request.shown_output) {
         facts.path = shown.clone().into();

@@ -33,6 +33,7 @@ mod e2e {
     mod profiles;
     mod queue;
     mod rebuild;
+    mod residue;
     mod retention;
     mod reuse;
     mod review;

@@ -10,6 +10,7 @@ use super::filled::Filled;
 use super::made::{Closed, Shaped, Skinned, Solved, Understood};
 use super::record::{Input, Line, Outcome, Run, Session, read};
 use super::sides::Side;
+use super::simplified::Simplified;
 use super::statistics::Spread;
 use super::transfer::Transfer;
 use super::way::Way;
@@ -59,6 +60,10 @@ impl Chapter {
 
     pub(super) fn filled(&self) -> impl Iterator<Item = &Filled> {
         self.lines.iter().filter_map(|line| if let Line::Filled(filled) = line { Some(&**filled) } else { None })
+    }
+
+    pub(super) fn simplified(&self) -> impl Iterator<Item = &Simplified> {
+        self.lines.iter().filter_map(|line| if let Line::Simplified(made) = line { Some(&**made) } else { None })
     }
 
     pub(super) fn transfers(&self) -> impl Iterator<Item = &Transfer> {

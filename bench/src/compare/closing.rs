@@ -74,7 +74,12 @@ pub(super) struct Bench {
 
 impl Bench {
     pub(super) fn open(options: &Options, sides: &[Side]) -> Result<Self, Error> {
-        let programs = Programs::prepare(sides, options.suture.clone())?;
+        Self::open_with(options, sides, &[])
+    }
+
+    /// The same with more Python packages than sides need.
+    pub(super) fn open_with(options: &Options, sides: &[Side], packages: &[&str]) -> Result<Self, Error> {
+        let programs = Programs::prepare_with(sides, packages, options.suture.clone())?;
         let folder = tempfile::tempdir().map_err(Error::io("making a folder"))?;
         let mut journal = Journal::open(&options.raw, options.resume)?;
         let machine = Machine::describe(folder.path(), programs.versions());
@@ -94,7 +99,7 @@ impl Bench {
     }
 
     /// The judge's word on a binary STL, and the engine's on what crosses itself, which the judge does not look at.
-    fn look(&self, file: &Path) -> Option<Found> {
+    pub(super) fn look(&self, file: &Path) -> Option<Found> {
         let counts = judge::judge(file).ok()?.counts;
         let report = said_whatever(&mut self.programs.command(&Way::plain(Side::Inspect), 1, file, Path::new("")));
         let crossing = &report["before"]["self_intersections"];

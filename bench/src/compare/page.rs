@@ -12,6 +12,7 @@ use super::page_damage;
 use super::page_formats;
 use super::page_meaning;
 use super::page_outlines;
+use super::page_simplify;
 use super::page_skin;
 use super::page_solids;
 use super::record::{Input, Judged, is_good};
@@ -54,6 +55,7 @@ pub(super) fn page(book: &Book, plots: &[(String, String)]) -> String {
     page += &page_arrays::arrays(book);
     page += &page_formats::formats(book);
     page += &page_outlines::outlines(book);
+    page += &page_simplify::simplify(book);
     for input in book.inputs() {
         page += &of_input(book, input);
     }

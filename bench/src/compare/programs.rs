@@ -28,13 +28,21 @@ impl Programs {
     /// # Errors
     /// When suture is wanted and cannot be built.
     pub(super) fn prepare(sides: &[Side], suture: Option<PathBuf>) -> Result<Self, Error> {
+        Self::prepare_with(sides, &[], suture)
+    }
+
+    /// The same, and `packages` of Python that no side names.
+    ///
+    /// # Errors
+    /// As [`Self::prepare`].
+    pub(super) fn prepare_with(sides: &[Side], packages: &[&str], suture: Option<PathBuf>) -> Result<Self, Error> {
         let suture = match suture {
             _ if !sides.iter().any(|side| side.is_suture()) => None,
             Some(path) => Some(path),
             None => Some(build_suture()?),
         };
         let help = suture.as_ref().and_then(|path| said(Command::new(path).args(["repair", "--help"])));
-        let wanted: Vec<_> = sides.iter().filter_map(|side| package(*side)).collect();
+        let wanted: Vec<_> = sides.iter().filter_map(|side| package(*side)).chain(packages.iter().copied()).collect();
         let (python, packages) = if wanted.is_empty() { (None, BTreeMap::new()) } else { python_with(&wanted) };
         Ok(Self {
             may_leave_si_out: help.is_some_and(|help| help.contains(NO_SI)),
@@ -46,17 +54,22 @@ impl Programs {
         })
     }
 
+    /// Why a package of Python cannot be called; `None` when it can.
+    pub(super) fn lack_of(&self, package: &str) -> Option<String> {
+        match &self.python {
+            None => Some("python3 with its venv module is not there".into()),
+            Some(_) if !self.packages.contains_key(package) => Some(format!("{package} could not be installed")),
+            Some(_) => None,
+        }
+    }
+
     /// Why a side cannot run; `None` when it can.
     pub(super) fn lack(&self, side: Side) -> Option<String> {
         match side.facts().program {
             Program::Suture if side.facts().flag == Some(NO_SI) && !self.may_leave_si_out => {
                 Some(format!("this suture has no {NO_SI}"))
             }
-            Program::Python { package, .. } => match &self.python {
-                None => Some("python3 with its venv module is not there".into()),
-                Some(_) if !self.packages.contains_key(package) => Some(format!("{package} could not be installed")),
-                Some(_) => None,
-            },
+            Program::Python { package, .. } => self.lack_of(package),
             Program::Admesh if self.admesh.is_none() => Some("admesh is not installed".into()),
             Program::Admesh | Program::Suture | Program::Convert | Program::Itself { .. } | Program::Copy => None,
         }
@@ -119,15 +132,26 @@ impl Programs {
     /// # Errors
     /// When the binary or the script cannot be read.
     pub(super) fn identity(&self, side: Side) -> Result<String, Error> {
-        let (name, path) = match side.facts().program {
-            Program::Python { script, package } => {
+        match side.facts().program {
+            Program::Python { script, package } => self.identity_of(Some((package, script))),
+            Program::Suture | Program::Convert => self.identity_of(None),
+            Program::Admesh => Ok(self.admesh.clone().unwrap_or_default()),
+            Program::Itself { .. } => Ok(self.tobj.clone().unwrap_or_default()),
+            Program::Copy => Ok("cp".into()),
+        }
+    }
+
+    /// The same of a package of Python with its script, or of suture.
+    ///
+    /// # Errors
+    /// When the binary or the script cannot be read.
+    pub(super) fn identity_of(&self, peer: Option<(&str, &str)>) -> Result<String, Error> {
+        let (name, path) = match peer {
+            Some((package, script)) => {
                 let version = self.packages.get(package).map_or("", String::as_str);
                 (format!("{package} {version}"), home().join("pipelines").join(script))
             }
-            Program::Suture | Program::Convert => ("suture".into(), self.suture.clone().unwrap_or_else(|| "suture".into())),
-            Program::Admesh => return Ok(self.admesh.clone().unwrap_or_default()),
-            Program::Itself { .. } => return Ok(self.tobj.clone().unwrap_or_default()),
-            Program::Copy => return Ok("cp".into()),
+            None => ("suture".into(), self.suture.clone().unwrap_or_else(|| "suture".into())),
         };
         let bytes = std::fs::read(&path).map_err(Error::io(format!("reading {}", path.display())))?;
         Ok(format!("{name} {:.12}", blake3::hash(&bytes).to_hex()))
@@ -264,6 +288,7 @@ for d in m.distributions(): print(d.metadata['Name'] + '==' + d.version)";
 
 #[cfg(test)]
 mod tests {
+    use super::super::simplified::Simplifier;
     use super::*;
 
     #[test]
@@ -288,6 +313,10 @@ mod tests {
             if let Program::Python { script, .. } = side.facts().program {
                 assert!(home().join("pipelines").join(script).exists(), "{script}");
             }
+        }
+        let pinned = pins(include_str!("../../pipelines/requirements.txt"));
+        for (package, script) in Simplifier::ALL.into_iter().filter_map(Simplifier::peer) {
+            assert!(home().join("pipelines").join(script).exists() && pinned.contains_key(package), "{script}");
         }
     }
 }

@@ -15,6 +15,7 @@ use super::filled::Filled;
 use super::machine::Machine;
 use super::made::{Closed, Shaped, Skinned, Solved, Understood};
 use super::sides::Side;
+use super::simplified::Simplified;
 use super::statistics::spaced;
 use super::transfer::Transfer;
 use super::way::Way;
@@ -35,6 +36,7 @@ pub(crate) enum Line {
     Skinned(Box<Skinned>),
     Transfer(Transfer),
     Filled(Box<Filled>),
+    Simplified(Box<Simplified>),
     /// Something was left out, and why.
     Skipped {
         side: Side,

@@ -8,7 +8,7 @@ pub use crate::contract::hint::{Hint, HintKind};
 pub use crate::contract::judgement::{Certificate, Faithful, Fidelity, RuleOutcome, RuleResult, Verdict};
 pub use crate::contract::loop_class::LoopClass;
 pub use crate::contract::repair_name::RepairName;
-pub use crate::contract::shaping::{Residue, ResidueRegion, Simplified, Smoothed};
+pub use crate::contract::shaping::{Residue, ResidueRegion, ResidueSuspect, Simplified, Smoothed};
 pub use crate::contract::skin::{Skin, SkinCause, SkinChange, SkinPlace};
 pub use crate::contract::thin_walls::{ThinPlace, ThinWalls};
 pub use crate::contract::volumes::{BodyLost, Volumes};
@@ -101,7 +101,7 @@ pub struct Report {
     /// Small features that were removed; `None` if the profile removes none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub features: Option<Features>,
-    /// Residue of a tool; `None` if the profile names no tool path.
+    /// Residue of a tool; `None` if the profile names no tool path, and does not want it looked for without one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub residue: Option<Residue>,
     /// Waves that were smoothed; `None` if the profile smooths none.

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 #[serde(default, deny_unknown_fields)]
 #[non_exhaustive]
 pub struct ResidueSettings {
-    /// The tool path that cut the part, a file: G-code, APT or CL data, or a project of CAMotics. Empty: no residue is looked for.
+    /// The tool path that cut the part, a file: G-code, APT or CL data, or a project of CAMotics. Empty: no residue is removed.
     /// In the daemon, `*` is the mesh's own name, and the path is copied before a worker begins: workers reach no other file.
     pub toolpath: String,
     /// How long a mesh of a hot folder waits for its tool path, in minutes; without one, it is repaired, and the report says so.
@@ -20,6 +20,13 @@ pub struct ResidueSettings {
     pub include: Vec<[[f64; 3]; 2]>,
     /// Boxes of which no triangle is residue's; they count more than the others.
     pub exclude: Vec<[[f64; 3]; 2]>,
+    /// A file with numbers of triangles that are residue's, counted from 0 in the order of the input: `12 40-52`, with `#` before comments. They count more than boxes. Empty: none.
+    /// `*` is as in `toolpath`.
+    pub brush: String,
+    /// A mesh file: no triangle is residue's whose centre is neither on this mesh nor, where it is closed, within it. It counts most. Empty: all may be. `*` is as in `toolpath`.
+    pub mask: String,
+    /// Where no tool path is named, periodic waves are looked for without one. Nothing is changed, and the result needs a review.
+    pub without_path: bool,
 }
 
 impl Default for ResidueSettings {
@@ -31,6 +38,9 @@ impl Default for ResidueSettings {
             tolerance_mm: 0.0,
             include: Vec::new(),
             exclude: Vec::new(),
+            brush: String::new(),
+            mask: String::new(),
+            without_path: false,
         }
     }
 }

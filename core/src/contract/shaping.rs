@@ -27,6 +27,30 @@ pub struct Residue {
     /// Each region (at most 1000 listed).
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub regions: Vec<ResidueRegion>,
+    /// Places that may be residue, looked for without a tool path ([`crate::ResidueSettings::without_path`]): nothing was changed there. At most 1000 are
+    /// listed; `None` if none were looked for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub suspects: Option<Vec<ResidueSuspect>>,
+}
+
+/// A place with periodic waves that may be what a tool left. A knurl or a thread looks the same.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub struct ResidueSuspect {
+    /// Height from trough to crest.
+    pub height: f64,
+    /// Distance of the crests.
+    pub pitch: f64,
+    /// Direction across the crests, of length 1.
+    pub across: [f64; 3],
+    /// The share of the variance of its height that a sine of this pitch explains.
+    pub confidence: f64,
+    /// Its area.
+    pub area: f64,
+    /// Its triangles.
+    pub triangles: u64,
+    /// The box that it lies in, by its least and greatest corners.
+    pub within: [[f64; 3]; 2],
 }
 
 /// A region of residue.

@@ -9,7 +9,7 @@ use crate::contract::error::Result;
 use crate::engine::clock::Clock;
 use crate::engine::copying;
 use crate::engine::files::{self, Made};
-use crate::engine::shaping::{self, Change, Step};
+use crate::engine::shaping::{self, Change, Origins, Step};
 use crate::engine::work::Work;
 use crate::io::read::MeshFile;
 use crate::io::write_behind::Nameless;
@@ -35,7 +35,8 @@ pub(crate) fn make(mesh: MeshFile, output: &Path, is_of_target: bool, work: Work
     }
     for step in &steps {
         let current = files::open(&spool.path(), limits, progress)?.called(made.mesh.path());
-        match step.look((current.path(), current.records()), &made.report, work)? {
+        let origins = || Origins { of: made.edit.origins(made.mesh.records()), inputs: made.mesh.records().len() };
+        match step.look((current.path(), current.records()), (&made.report, &origins), work)? {
             Ok(change) => {
                 clock.stage(step.stage());
                 if let Some(next) = changed(&current, (step, change), &mut made, work)? {

@@ -6,7 +6,7 @@ use crate::contract::report::FaceOrigin;
 use crate::contract::settings::{Limits, Profile};
 use crate::engine::memory::{self, Held, RepairedMesh};
 use crate::engine::mesh::{Mesh, MeshView};
-use crate::engine::shaping::{self, Change, Step};
+use crate::engine::shaping::{self, Change, Origins, Step};
 use crate::engine::work::Work;
 use crate::repairs::Steps;
 
@@ -22,7 +22,9 @@ pub(crate) fn repair(mesh: MeshView<'_>, profile: &Profile, limits: &Limits, pro
     let work = Work { profile, limits, progress };
     for step in shaping::steps(profile) {
         let records = repaired.mesh.view().records(limits.threads);
-        let found = step.look((Held::path(), &records), &repaired.report, work)?;
+        let of = || repaired.origins.iter().map(|origin| origin.input_face()).collect();
+        let origins = || Origins { of: of(), inputs: mesh.faces().len() };
+        let found = step.look((Held::path(), &records), (&repaired.report, &origins), work)?;
         drop(records);
         match found {
             Ok(change) => changed(&mut repaired, (&step, change), work)?,

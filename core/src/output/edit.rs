@@ -254,6 +254,29 @@ impl Edit {
         added.try_for_each(|(record, from)| step(Step::Added(record, *from)))
     }
 
+    /// For each record of the output the record of the input that it is, or is a part of; `None` for a new one. O(output).
+    pub(crate) fn origins(&self, records: &[Record]) -> Vec<Option<u32>> {
+        let mut origins = Vec::with_capacity(records.len());
+        let mut at = 0;
+        let walked: Result<(), std::convert::Infallible> = self.walk(records, |step| {
+            match step {
+                Step::Untouched(run) => {
+                    origins.extend((at..).take(run.len()).map(Some));
+                    at += run.len() as u32;
+                }
+                Step::Changed(_, _, from) => {
+                    origins.push(from.input_face());
+                    at += 1;
+                }
+                Step::Deleted(_) => at += 1,
+                Step::Added(_, from) => origins.push(from.input_face()),
+            }
+            Ok(())
+        });
+        let Ok(()) = walked;
+        origins
+    }
+
     pub(crate) fn summary(&self, input_records: usize) -> EditSummary {
         let gone = self.gone();
         EditSummary {

@@ -3,7 +3,7 @@
 use super::cuts::{Family, families};
 use super::found::{Found, Kind, Mesh, RegionReport};
 use super::intended::{Limits, Scratch, Verdict, judge};
-use super::options::{Error, Options};
+use super::options::{Corrections, Error, Options};
 use super::regions::{clean, neighbours, pieces};
 use super::sweep::nearest;
 use crate::curves::vector::{Point, cross, plain_norm, sub};
@@ -178,6 +178,15 @@ fn regions(mesh: Mesh<'_>, marks: Vec<Mark>, height_min: f64, options: &Options<
     Ok(Found { labels, targets, regions: reports })
 }
 
+/// For each triangle, whether corrections let it be residue's.
+pub(super) fn allowed(mesh: Mesh<'_>, options: &Options<'_>) -> Vec<bool> {
+    let mut is_in = vec![true; mesh.faces.len()];
+    let Corrections { exclude, mask, .. } = options.corrections;
+    let corrections = Corrections { exclude, mask, ..Corrections::default() };
+    correct(mesh, &mut is_in, &Options { corrections, ..options.clone() });
+    is_in
+}
+
 /// Corrections by hand.
 fn correct(mesh: Mesh<'_>, is_in: &mut [bool], options: &Options<'_>) {
     let hand = &options.corrections;
@@ -188,8 +197,7 @@ fn correct(mesh: Mesh<'_>, is_in: &mut [bool], options: &Options<'_>) {
         if hand.include.is_empty() && hand.exclude.is_empty() {
             break;
         }
-        let [a, b, c] = mesh.corners(face);
-        let middle = [0, 1, 2].map(|axis: usize| (a[axis] + b[axis] + c[axis]) / 3.0);
+        let middle = mesh.middle(face);
         *is_in = (*is_in || holds(hand.include, middle)) && !holds(hand.exclude, middle);
     }
     for face in hand.triangles {

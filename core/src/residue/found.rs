@@ -13,6 +13,12 @@ impl Mesh<'_> {
     pub(super) fn corners(&self, face: &[u32; 3]) -> [[f64; 3]; 3] {
         face.map(|vertex| self.points.get(vertex as usize).map_or([0.0; 3], |point| point.map(f64::from)))
     }
+
+    /// The centre of a triangle.
+    pub(super) fn middle(&self, face: &[u32; 3]) -> [f64; 3] {
+        let [a, b, c] = self.corners(face);
+        [0, 1, 2].map(|axis: usize| (a[axis] + b[axis] + c[axis]) / 3.0)
+    }
 }
 
 /// The form of residue.

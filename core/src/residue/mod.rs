@@ -2,12 +2,14 @@
 //!
 //! **In:** a mesh of a simulated workpiece, the moves of the tool, the tools.
 //! **Out:** [`find()`]: regions of residue, for each triangle its region, for each vertex its place on the intended surface; [`repair()`]: the
-//! mesh with those regions moved there; [`hint`]: waves of a patch without a path, for a person to look at.
+//! mesh with those regions moved there; [`hint`], [`suspects()`]: waves of a patch, or of a whole mesh, without a path, for a person to
+//! look at.
 //!
 //! The swept volume is the least signed distance from the tool over all cutting moves (`cuts`, `tree`, `sweep`, `profile`); `intended` has
 //! the surface between passes, `find` and `regions` the triangles, `repair` the move.
 //! **Promise:** borders of regions and all outside them stay as they are, to the bit; the same result for any number of threads.
 
+mod brush;
 mod cuts;
 mod find;
 mod found;
@@ -19,12 +21,15 @@ mod repair;
 mod spectrum;
 mod sweep;
 mod tree;
+mod waves;
 
 #[cfg(test)]
 mod tests;
 
+pub use brush::{Brush, BrushError};
 pub use find::find;
 pub use found::{Found, Kind, Mesh, RegionReport};
 pub use options::{Corrections, Error, Options, Region};
 pub use repair::{Repaired, repair};
 pub use spectrum::{Hint, hint};
+pub use waves::{Suspect, suspects};

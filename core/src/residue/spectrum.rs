@@ -14,7 +14,7 @@ const SAMPLES: usize = 4096;
 /// Directions in half a turn.
 const DIRECTIONS: u32 = 60;
 /// Periods between the shortest and the longest, in equal steps of wave number.
-const PERIODS: u32 = 240;
+const PERIODS: usize = 240;
 /// Waves over the patch, at least: fewer are its form.
 const WAVES: f64 = 4.0;
 
@@ -58,55 +58,76 @@ pub fn hint(mesh: Mesh<'_>, patch: &[u32]) -> Result<Option<Hint>, Error> {
         .filter_map(|vertex| mesh.points.get(*vertex as usize))
         .map(|point| point.map(f64::from))
         .collect();
-    let side = if normal[0].abs() < 0.7 { [1.0, 0.0, 0.0] } else { [0.0, 1.0, 0.0] };
-    let Some(first) = plain_unit(sub(side, scale(normal, dot(side, normal)))) else { return Ok(None) };
-    Ok(search(&places, [first, cross(normal, first), normal], edges))
+    let Some(axes) = axes(normal) else { return Ok(None) };
+    let middle = scale(places.iter().copied().fold([0.0; 3], add), 1.0 / places.len().max(1) as f64);
+    let flat = |place: &Point| axes.map(|axis| dot(sub(*place, middle), axis));
+    let mut list: Vec<Point> = places.iter().map(flat).collect();
+    let size = size(&list);
+    if flatten(&mut list, size).is_none() {
+        return Ok(None);
+    }
+    Ok(search(&list, axes, [2.5 * edges, 2.0 * size / WAVES]))
 }
 
-fn search(places: &[Point], [first, second, normal]: [Point; 3], edge: f64) -> Option<Hint> {
-    let middle = scale(places.iter().copied().fold([0.0; 3], add), 1.0 / places.len().max(1) as f64);
-    let flat = |place: &Point| [first, second, normal].map(|axis| dot(sub(*place, middle), axis));
-    let mut list: Vec<Point> = places.iter().map(flat).collect();
-    let size = list.iter().map(|[x, y, _]| x.hypot(*y)).fold(0.0, f64::max);
-    let (longest, shortest) = (2.0 * size / WAVES, 2.5 * edge);
-    if list.len() < 64 || !(shortest > 0.0 && longest > shortest) {
-        return None;
-    }
-    flatten(&mut list, size)?;
+/// Two directions along a plane of this unit normal, and the normal.
+pub(super) fn axes(normal: Point) -> Option<[Point; 3]> {
+    let side = if normal[0].abs() < 0.7 { [1.0, 0.0, 0.0] } else { [0.0, 1.0, 0.0] };
+    let first = plain_unit(sub(side, scale(normal, dot(side, normal))))?;
+    Some([first, cross(normal, first), normal])
+}
+
+/// How far places are from the middle at most, along the plane.
+pub(super) fn size(list: &[Point]) -> f64 {
+    list.iter().map(|[x, y, _]| x.hypot(*y)).fold(0.0, f64::max)
+}
+
+/// The strongest wave of this range of lengths among heights over a plane.
+pub(super) fn search(list: &[Point], [first, second, _]: [Point; 3], [shortest, longest]: [f64; 2]) -> Option<Hint> {
     let total: f64 = list.iter().map(|[_, _, z]| z * z).sum();
-    if total <= 0.0 {
+    if list.len() < 64 || !(shortest > 0.0 && longest > shortest && total > 0.0) {
         return None;
     }
-    let share = |angle: f64, wave: f64| {
-        let (sin, cos) = angle.sin_cos();
-        let add = |(a, b): (f64, f64), [x, y, z]: &Point| {
-            let (s, c) = (wave * (x * cos + y * sin)).sin_cos();
-            (a + z * s, b + z * c)
+    let best = |angles: &[f64], low: f64, step: f64, count: usize| {
+        let of = |angle: &f64| {
+            let shares = shares(list, *angle, (low, step, count));
+            let waves = shares.into_iter().enumerate().map(|(n, power)| (power / total, *angle, low + n as f64 * step));
+            waves.max_by(|a, b| a.0.total_cmp(&b.0))
         };
-        let (a, b) = list.iter().fold((0.0, 0.0), add);
-        2.0 * (a * a + b * b) / (list.len() as f64 * total)
-    };
-    let (low, high) = (std::f64::consts::TAU / longest, std::f64::consts::TAU / shortest);
-    let (turn, step) = (std::f64::consts::PI / f64::from(DIRECTIONS), (high - low) / f64::from(PERIODS));
-    let best = |angles: &[f64], waves: &[f64]| {
-        let of = |angle: &f64| waves.iter().map(|wave| (share(*angle, *wave), *angle, *wave)).max_by(|a, b| a.0.total_cmp(&b.0));
         let each: Vec<Option<(f64, f64, f64)>> = angles.par_iter().map(of).collect();
         each.into_iter().flatten().max_by(|a, b| a.0.total_cmp(&b.0))
     };
+    let (low, high) = (std::f64::consts::TAU / longest, std::f64::consts::TAU / shortest);
+    let (turn, step) = (std::f64::consts::PI / f64::from(DIRECTIONS), (high - low) / PERIODS as f64);
     let angles: Vec<f64> = (0..DIRECTIONS).map(|n| f64::from(n) * turn).collect();
-    let waves: Vec<f64> = (0..=PERIODS).map(|n| low + f64::from(n) * step).collect();
-    let (_, angle, wave) = best(&angles, &waves)?;
-    let near = |value: f64, width: f64| (-10..=10).map(|n| value + f64::from(n) * 0.1 * width).collect::<Vec<_>>();
-    let (share, angle, wave) = best(&near(angle, turn), &near(wave, step))?;
+    let (_, angle, wave) = best(&angles, low, step, PERIODS + 1)?;
+    let near: Vec<f64> = (-10..=10).map(|n| angle + f64::from(n) * 0.1 * turn).collect();
+    let (share, angle, wave) = best(&near, wave - step, 0.1 * step, 21)?;
     let mut heights: Vec<f64> = list.iter().map(|[_, _, z]| *z).collect();
     heights.sort_unstable_by(f64::total_cmp);
     let at = |part: f64| heights.get((heights.len() as f64 * part) as usize).copied().unwrap_or(0.0);
     let across = add(scale(first, angle.cos()), scale(second, angle.sin()));
-    Some(Hint { across, pitch: std::f64::consts::TAU / wave, height: at(0.98) - at(0.02), share })
+    // Where places lie unevenly, waves are not independent of each other, and one may take more than there is.
+    Some(Hint { across, pitch: std::f64::consts::TAU / wave, height: at(0.98) - at(0.02), share: share.min(1.0) })
+}
+
+/// What waves in one direction, `count` of them by equal steps of wave number, explain of the sum of squares of heights. Each place's phase goes on from
+/// wave to wave by one turn: a sine for each would take ten times as long.
+fn shares(list: &[Point], angle: f64, (low, step, count): (f64, f64, usize)) -> Vec<f64> {
+    let (sin, cos) = angle.sin_cos();
+    let mut sums = vec![(0.0, 0.0); count];
+    for [x, y, z] in list {
+        let along = x * cos + y * sin;
+        let ((mut s, mut c), (ds, dc)) = ((low * along).sin_cos(), (step * along).sin_cos());
+        for (a, b) in &mut sums {
+            (*a, *b) = (*a + z * s, *b + z * c);
+            (s, c) = (s * dc + c * ds, c * dc - s * ds);
+        }
+    }
+    sums.into_iter().map(|(a, b)| 2.0 * (a * a + b * b) / list.len() as f64).collect()
 }
 
 /// Takes the least-squares parabolic surface away from heights; `None` if the places do not determine one.
-fn flatten(list: &mut [Point], size: f64) -> Option<()> {
+pub(super) fn flatten(list: &mut [Point], size: f64) -> Option<()> {
     let terms = |[x, y, _]: &Point| {
         let (x, y) = (x / size, y / size);
         [1.0, x, y, x * x, x * y, y * y]

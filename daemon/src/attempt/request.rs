@@ -4,7 +4,7 @@ use suture_core::report::Task;
 use suture_core::{Limits, Profile};
 use suture_store::{Claim, Job};
 
-use crate::beside::Toolpath;
+use crate::beside::Companion;
 use crate::claim::CLAIMED;
 use crate::config::Config;
 use crate::folder::Folder;
@@ -22,7 +22,7 @@ pub(super) fn request(
     folder: &Folder,
     claim: &Claim,
     job: &Job,
-    (profile, toolpath): (Profile, Option<Toolpath>),
+    (profile, companions): (Profile, Vec<Companion>),
     limits: Limits,
 ) -> Request {
     let work = folder.work(claim.token);
@@ -36,7 +36,7 @@ pub(super) fn request(
         shown_input: folder.inbox().join(job.source.path.to_path()).display().to_string(),
         shown_output: None,
         profile,
-        toolpath,
+        companions,
         limits,
     }
 }

@@ -172,6 +172,15 @@ pub(crate) struct ResidueArgs {
     /// A box whose triangles are not; counts more
     #[arg(long, value_name = "X,Y,Z:X,Y,Z", value_parser = parse_box, allow_hyphen_values = true)]
     pub exclude: Vec<[[f64; 3]; 2]>,
+    /// A text file with numbers of triangles that are residue's, from 0 in the order of IN, as 12 40-52; counts more than boxes
+    #[arg(long, value_name = "FILE")]
+    pub brush: Option<PathBuf>,
+    /// A mesh: no triangle is residue's whose centre is neither on it nor, if it is closed, within it; counts most
+    #[arg(long, value_name = "MESH")]
+    pub mask: Option<PathBuf>,
+    /// Without a tool path: tell where periodic waves may be what a tool left; nothing is moved, and a person must look
+    #[arg(long, conflicts_with_all = ["toolpath", "tools", "tolerance", "include", "brush"])]
+    pub without_path: bool,
     #[command(flatten)]
     pub repair: RepairArgs,
 }

@@ -253,6 +253,11 @@ impl Tree {
         self.square_beyond(point, 0.0).sqrt()
     }
 
+    /// Whether a point is no farther than `reach` from a triangle.
+    pub(crate) fn is_within(&self, point: DVec3, reach: f64) -> bool {
+        self.square_beyond(point, reach * reach) <= reach * reach
+    }
+
     /// The largest of some points' distances; 0 if there are none. Most points need no more than a look at a triangle that is nearer.
     pub(crate) fn farthest(&self, points: impl IntoIterator<Item = DVec3>) -> f64 {
         points.into_iter().fold(0.0, |so_far: f64, p| so_far.max(self.square_beyond(p, so_far))).sqrt()

@@ -3,6 +3,7 @@
 //! Each step looks at the mesh and says which triangles go and which come; the mesh that it makes is judged by itself, and counts only if it is no worse.
 
 mod change;
+mod corrections;
 mod features;
 mod residue;
 mod simplifying;
@@ -21,13 +22,14 @@ use crate::io::record::{self, Record};
 use crate::output::edit::Edit;
 use crate::util::parallel;
 pub(crate) use change::{Change, Told};
+pub(crate) use corrections::Origins;
 
 /// A step that a profile asks for.
 #[derive(Clone, Debug)]
 pub(crate) enum Step {
     /// Small features go.
     Features(crate::defeature::Limits),
-    /// Residue of a tool goes.
+    /// Residue of a tool goes, or is looked for without a tool path.
     Residue,
     /// Waves go.
     Smooth,
@@ -41,7 +43,8 @@ pub(crate) fn steps(profile: &Profile) -> Vec<Step> {
         return Vec::new();
     }
     let features = features::limits_of(profile).map(Step::Features);
-    let residue = (!profile.residue.toolpath.is_empty()).then_some(Step::Residue);
+    let is_residue = !profile.residue.toolpath.is_empty() || profile.residue.without_path;
+    let residue = is_residue.then_some(Step::Residue);
     let smooth = (profile.smooth_waves_below_mm > 0.0).then_some(Step::Smooth);
     let is_simpler = profile.simplify_triangles > 0 || profile.simplify_ratio > 0.0 || profile.simplify_within_mm > 0.0;
     [features, residue, smooth, is_simpler.then_some(Step::Simplify)].into_iter().flatten().collect()
@@ -77,14 +80,14 @@ impl Step {
         }
     }
 
-    /// Looks at a mesh; why nothing changes, where nothing can.
+    /// Looks at a mesh; why nothing changes, where nothing can. `origins`: of its triangles, where a step wants to know them.
     ///
     /// # Errors
     /// [`Error::cancelled`].
     pub(crate) fn look(
         &self,
         (path, records): (&Path, &[Record]),
-        report: &Report,
+        (report, origins): (&Report, &(dyn Fn() -> Origins + Sync)),
         work: Work<'_>,
     ) -> Result<std::result::Result<Change, Told>> {
         if matches!(self, Self::Features(_)) && !report.verdict.good {
@@ -105,7 +108,7 @@ impl Step {
         drop(corners);
         let found = parallel::in_pool(work.limits.threads, || match self {
             Self::Features(below) => features::find(&mesh, below),
-            Self::Residue => residue::find(&mesh, work),
+            Self::Residue => residue::find(&mesh, origins, work),
             Self::Smooth => smoothing::smooth(&mesh, work),
             Self::Simplify => simplifying::simplify(&mesh, work),
         });
@@ -132,7 +135,7 @@ impl Told {
     pub(crate) fn put(self, report: &mut Report) {
         match self {
             Self::Features(told) => report.features = Some(told),
-            Self::Residue(told) => report.residue = Some(told),
+            Self::Residue(told) => residue::put(told, report),
             Self::Smoothed(told) => report.smoothed = Some(told),
             Self::Simplified(told) => report.simplified = Some(told),
         }

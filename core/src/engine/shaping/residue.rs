@@ -1,15 +1,17 @@
-//! Residue of a tool, by the path that a profile names.
+//! Residue of a tool, by the path that a profile names; or places that may be residue, where it wants them looked for without one.
 
 use std::path::Path;
 
 use super::change::{Change, Told, is_moved, replaced, vertices_moved};
-use crate::contract::report::{MOST_LISTED, Residue, ResidueRegion};
+use super::corrections::{self, FromFiles, Origins};
+use crate::contract::report::{MOST_LISTED, Outcome, Report, Residue, ResidueRegion, ResidueSuspect};
 use crate::engine::mesh::Mesh;
 use crate::engine::work::Work;
 use crate::residue::{self, Corrections, Found, Kind, Repaired};
 use crate::simplify::{self, Input, Options};
 use crate::smooth;
 use crate::toolpath::{self, Program, Tool, project, tools};
+use crate::util::words::Counted;
 
 /// Regions keep this share of their triangles, where that keeps to the surface.
 const SHARE: f64 = 0.2;
@@ -19,11 +21,11 @@ const OFF: f64 = 0.5;
 const FINDINGS: usize = 20;
 
 /// The mesh without residue, or why that cannot be.
-pub(super) fn find(mesh: &Mesh, work: Work<'_>) -> Result<Change, String> {
+pub(super) fn find(mesh: &Mesh, origins: &dyn Fn() -> Origins, work: Work<'_>) -> Result<Change, String> {
     let settings = &work.profile.residue;
-    let program = program(Path::new(&settings.toolpath), &settings.tools)?;
     let go_on = || !work.progress.cancelled();
-    let corrections = Corrections { include: &settings.include, exclude: &settings.exclude, ..Corrections::default() };
+    let FromFiles { triangles, mask } = corrections::read(mesh, origins, work)?;
+    let corrections = Corrections { include: &settings.include, exclude: &settings.exclude, triangles: &triangles, mask: &mask };
     let options = residue::Options {
         tolerance: (settings.tolerance_mm > 0.0).then_some(settings.tolerance_mm),
         feature_degrees: work.profile.keep_edges_degrees,
@@ -31,10 +33,48 @@ pub(super) fn find(mesh: &Mesh, work: Work<'_>) -> Result<Change, String> {
         go_on: &go_on,
         ..Default::default()
     };
+    if settings.toolpath.is_empty() { suspect(mesh, &options) } else { removed(mesh, &options, work) }
+}
+
+/// Places that may be residue; the mesh stays as it is.
+fn suspect(mesh: &Mesh, options: &residue::Options<'_>) -> Result<Change, String> {
+    let view = residue::Mesh { points: mesh.vertices(), faces: mesh.faces() };
+    let found = residue::suspects(view, options).map_err(|error| error.to_string())?;
+    let told = |suspect: &residue::Suspect| ResidueSuspect {
+        height: suspect.height,
+        pitch: suspect.pitch,
+        across: suspect.across,
+        confidence: suspect.confidence,
+        area: suspect.area,
+        triangles: suspect.triangles.len() as u64,
+        within: suspect.within,
+    };
+    let suspects = Some(found.iter().take(MOST_LISTED).map(told).collect());
+    Ok(Change { gone: Vec::new(), added: Vec::new(), told: Told::Residue(Residue { suspects, ..Residue::default() }) })
+}
+
+/// Puts residue into a report. Where it was looked for without a path, a person has to look at the result.
+pub(super) fn put(told: Residue, report: &mut Report) {
+    if let Some(suspects) = told.suspects.as_ref().filter(|_| report.verdict.good) {
+        report.outcome = Outcome::NeedsReview;
+        report.verdict.reasons.push(match suspects.len() {
+            0 => "no waves of a tool were found, which is no proof without its path".into(),
+            found => {
+                format!("{} may be what a tool left, or be meant", Counted(found as u64, "place with waves", "places with waves"))
+            }
+        });
+    }
+    report.residue = Some(told);
+}
+
+/// The mesh without residue, by the path.
+fn removed(mesh: &Mesh, options: &residue::Options<'_>, work: Work<'_>) -> Result<Change, String> {
+    let settings = &work.profile.residue;
+    let program = program(Path::new(&settings.toolpath), &settings.tools)?;
     let view = residue::Mesh { points: mesh.vertices(), faces: mesh.faces() };
     let named = |error: residue::Error| format!("{}: {error}", settings.toolpath);
-    let found = residue::find(view, &program.moves, &program.header.tools, &options).map_err(named)?;
-    let repaired = residue::repair(view, &found, &options).map_err(named)?;
+    let found = residue::find(view, &program.moves, &program.header.tools, options).map_err(named)?;
+    let repaired = residue::repair(view, &found, options).map_err(named)?;
     let mut told = told(&found, &program);
     if told.triangles_before == 0 {
         return Ok(Change { gone: Vec::new(), added: Vec::new(), told: Told::Residue(told) });

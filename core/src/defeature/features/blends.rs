@@ -56,7 +56,7 @@ fn strip(mesh: &Mesh, segments: &Segments, number: u32, kind: Kind) -> Option<St
     let segment = &segments.list[number as usize];
     let is_shape = match segment.surface {
         Surface::Cylinder { .. } | Surface::Torus { .. } => kind == Kind::Fillet,
-        Surface::Plane { .. } => kind == Kind::Chamfer && segment.triangles.len() <= 64,
+        Surface::Plane { .. } => kind == Kind::Chamfer && segment.is_proven && segment.triangles.len() <= 64,
         Surface::Cone { .. } => kind == Kind::Chamfer,
         Surface::Sphere { .. } => false,
     };
@@ -72,7 +72,7 @@ fn strip(mesh: &Mesh, segments: &Segments, number: u32, kind: Kind) -> Option<St
         _ => return None,
     };
     let supports = [support(mesh, segments, &sides[0])?, support(mesh, segments, &sides[1])?];
-    if supports[0] == supports[1] {
+    if supports[0] == supports[1] || supports.iter().any(|s| !segments.list[*s as usize].is_proven) {
         return None;
     }
     let fits = match kind {

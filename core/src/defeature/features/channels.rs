@@ -10,11 +10,9 @@ use super::super::segments::{Segment, Segments};
 use super::super::sets::Sets;
 use super::super::surface::Surface;
 use super::super::vector::{Point, cross, dot, mean, scale, sub};
-use super::patch::{Candidate, confidence, extent};
+use super::patch::{COS_SMOOTH, Candidate, confidence, extent};
 use crate::defeature::loops::loops;
 
-/// Cosine of 6°: faces that meet in less are smooth.
-const COS_SMOOTH: f64 = 0.9945;
 /// Cosine of the least angle between the normals of leaning walls, 20°: a V is no wider than 160°.
 const COS_MOUTH: f64 = 0.94;
 /// Segments of a channel.
@@ -89,7 +87,7 @@ fn channel(mesh: &Mesh, segments: &Segments, group: &[u32], limits: &Limits) -> 
     let parts: Vec<&Segment> = group.iter().map(|s| &segments.list[*s as usize]).collect();
     let walls: Vec<Wall> = parts
         .iter()
-        .filter(|s| s.surface.is_plane())
+        .filter(|s| s.surface.is_plane() && s.is_proven)
         .filter_map(|s| {
             s.triangles.first().map(|t| Wall { area: s.area, normal: s.outward(mesh.centroid(*t)), point: mesh.centroid(*t) })
         })
@@ -108,6 +106,9 @@ fn channel(mesh: &Mesh, segments: &Segments, group: &[u32], limits: &Limits) -> 
     };
     let rims = loops(mesh, &triangles, |t| triangles.binary_search(&t).is_ok());
     let is_ring = parts.iter().any(|s| matches!(s.surface, Surface::Cylinder { axis, .. } if dot(axis, normal).abs() > 0.999));
+    if !segments.are_drawn(mesh, group, &rims) {
+        return None;
+    }
     let kind = if is_ring && rims.len() == 2 { Kind::RingGroove } else { Kind::Groove };
     let points: Vec<Point> = triangles.iter().map(|t| mesh.centroid(*t)).collect();
     let sum = triangles.iter().fold([0.0; 3], |sum: Point, t| {

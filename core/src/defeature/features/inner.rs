@@ -14,6 +14,8 @@ use super::measure::rim;
 
 /// A face with a hole has six triangles at least.
 const LEAST_TRIANGLES: usize = 6;
+/// Cosine of 40°: rows of facets of a smooth body turn by less, chamfers by 45°.
+const COS_ROW: f64 = 0.766;
 
 /// The pieces without inner loops of their own, each as rising numbers of triangles. O(n log n).
 pub(super) fn pieces(mesh: &Mesh, segments: &Segments, widest: Option<f64>) -> Vec<Vec<u32>> {
@@ -25,7 +27,7 @@ pub(super) fn pieces(mesh: &Mesh, segments: &Segments, widest: Option<f64>) -> V
             continue;
         }
         let rims = loops(mesh, &segment.triangles, |t| segments.of[t as usize] == number as u32);
-        if rims.len() < 2 || is_ledge(mesh, segments, &rims, widest) {
+        if rims.len() < 2 || is_ledge(mesh, segments, &rims, widest) || is_chord(mesh, segments, segment, &rims) {
             continue;
         }
         for rim in rims.into_iter().filter(|rim| is_inner(mesh, segment, rim)) {
@@ -64,6 +66,30 @@ fn is_ledge(mesh: &Mesh, segments: &Segments, rims: &[Vec<u32>], widest: Option<
     let (Some(a), Some(b)) = (circle(one), circle(other)) else { return false };
     let ((wide, centre, is_ridge), (narrow, place, is_step)) = if a.0 > b.0 { (a, b) } else { (b, a) };
     wide < widest && !is_ridge && is_step && distance(centre, place) < 0.05 * narrow
+}
+
+/// Whether a flat ring is no face but one row of the facets of a smooth body, as the crest of a lathed one is: it turns into flats
+/// or cones of half to twice its width at all of its rims, by less than 40°.
+fn is_chord(mesh: &Mesh, segments: &Segments, face: &Segment, rims: &[Vec<u32>]) -> bool {
+    let length = |half: &u32| distance(mesh.at(mesh.from(*half)), mesh.at(mesh.to(*half)));
+    let outline: f64 = rims.iter().flatten().map(length).sum();
+    let own = 2.0 * face.area / outline.max(1e-300);
+    face.surface.is_plane()
+        && rims.iter().all(|rim| {
+            let mut beside: Vec<u32> = rim.iter().map(|half| segments.get(mesh.across(*half)).0).collect();
+            beside.sort_unstable();
+            beside.dedup();
+            let parts = || beside.iter().map(|s| &segments.list[*s as usize]);
+            let width = parts().map(|s| s.area).sum::<f64>() / rim.iter().map(length).sum::<f64>().max(1e-300);
+            let is_smooth = |half: &u32| {
+                let middle = mesh.at(mesh.from(*half));
+                dot(face.outward(middle), segments.get(mesh.across(*half)).1.outward(middle)) > COS_ROW
+            };
+            width > 0.5 * own
+                && width < 2.0 * own
+                && parts().all(|s| matches!(s.surface, Surface::Plane { .. } | Surface::Cone { .. }))
+                && rim.iter().all(is_smooth)
+        })
 }
 
 /// Whether a loop bounds its face from within: it turns the other way, and not around a cylinder.

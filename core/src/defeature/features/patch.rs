@@ -12,6 +12,9 @@ use super::strip::Strip;
 /// The largest volume of a patch, in its widest rim's area times its extent.
 const MOST_FILL: f64 = 1.3;
 
+/// Cosine of 6°: what turns less is smooth.
+pub(super) const COS_SMOOTH: f64 = 0.9945;
+
 /// A patch that may be a feature.
 pub(crate) struct Candidate {
     pub(crate) kind: Kind,
@@ -53,6 +56,10 @@ pub(super) fn classify(mesh: &Mesh, segments: &Segments, triangles: Vec<u32>) ->
     let slack = 8.0 * mesh.flatness() + 0.02 * (high - low);
     let axis = carrier.outward(first.centre);
     let numbers = segment_numbers(segments, &triangles);
+    // What is of free form has a clear edge: roughness of a face has none.
+    if !segments.are_drawn(mesh, &numbers, &loops) && !has_edge(mesh, segments, &loops) {
+        return None;
+    }
     let confidence = confidence(mesh, segments, &numbers);
     let make = |kind, size, depth, triangles, loops| {
         let centres: Vec<Point> = rims.iter().map(|r| r.centre).collect();
@@ -108,10 +115,23 @@ fn segment_numbers(segments: &Segments, triangles: &[u32]) -> Vec<u32> {
     numbers
 }
 
-/// How well the vertices lie on the surfaces of the patch: 1 on them, 0 at the tolerance of rounding.
+/// How well the vertices lie on the surfaces of the patch, 1 on them, 0 at the tolerance of rounding, times the share of its area
+/// whose surfaces are proven.
 pub(super) fn confidence(mesh: &Mesh, segments: &Segments, numbers: &[u32]) -> f64 {
     let worst = numbers.iter().map(|s| segments.list[*s as usize].residual).fold(0.0, f64::max);
-    (1.0 - worst / (16.0 * mesh.flatness()).max(1e-300)).clamp(0.0, 1.0)
+    segments.proven_share(numbers) * (1.0 - worst / (16.0 * mesh.flatness()).max(1e-300)).clamp(0.0, 1.0)
+}
+
+/// Whether nine tenths of the rims' length, at least, turn by more than 6°.
+fn has_edge(mesh: &Mesh, segments: &Segments, loops: &[Vec<u32>]) -> bool {
+    let (mut sharp, mut all) = (0.0, 0.0);
+    for half in loops.iter().flatten() {
+        let length = distance(mesh.at(mesh.from(*half)), mesh.at(mesh.to(*half)));
+        let outward = segments.get(mesh.across(*half)).1.outward(mesh.at(mesh.from(*half)));
+        all += length;
+        sharp += if dot(outward, mesh.normals[(half / 3) as usize]) < COS_SMOOTH { length } else { 0.0 };
+    }
+    sharp > 0.9 * all
 }
 
 struct Wall {

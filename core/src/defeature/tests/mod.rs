@@ -197,6 +197,33 @@ fn a_smooth_body_has_no_features() {
     assert_eq!(defeature(&part.points, &part.triangles, &ALL).unwrap(), Removed::default());
 }
 
+/// The crest and the foot of a ring are flat where its sections are even: facets of the body, not faces that a hole leads between.
+#[test]
+fn the_throat_of_a_ring_is_no_hole() {
+    for (wide, high, sections) in [(2.0, 2.0, 20), (2.0, 3.0, 20), (3.0, 2.0, 28)] {
+        let section = |k: usize| [std::f64::consts::TAU * (k as f64 + 0.5) / sections as f64].map(f64::sin_cos)[0];
+        let profile: Vec<_> = (0..sections).map(section).map(|(s, c)| [10.0 + wide * c, high * s]).collect();
+        let part = parts::ring(&profile, 48);
+        let limits =
+            Limits { holes_below: Some(50.0), fillets_below: Some(1.0), grooves_below: Some(50.0), bosses_below: Some(50.0) };
+        assert_eq!(defeature(&part.points, &part.triangles, &limits).unwrap(), Removed::default());
+    }
+    // The same throat between flat faces is one.
+    let part = parts::ring(&[[8.0, -2.0], [15.0, -2.0], [15.0, 2.0], [8.0, 2.0]], 48);
+    let edit = defeature(&part.points, &part.triangles, &Limits { holes_below: Some(50.0), ..Limits::default() }).unwrap();
+    assert_eq!(edit.features.iter().map(|f| (f.kind, f.outcome)).collect::<Vec<_>>(), [(Kind::ThroughHole, Outcome::Removed)]);
+}
+
+/// Each valley between triangles of a coarse sculpture has two walls that lean towards each other: three vertices lie on a plane
+/// anywhere.
+#[test]
+fn valleys_of_a_free_form_are_no_grooves() {
+    let part = parts::ball(14, |[x, y, z]: [f64; 3]| {
+        8.0 + 0.7 * (11.3 * x + 1.0).sin() * (9.7 * y + 2.0).cos() + 0.6 * (8.9 * z + 7.1 * x).sin()
+    });
+    assert_eq!(defeature(&part.points, &part.triangles, &ALL).unwrap(), Removed::default());
+}
+
 #[test]
 fn what_was_removed_is_not_found_again() {
     let part = parts::stepped([30.0, 20.0, 5.0], &parts::circle([12.0, 9.0], 1.0, 24), -2.0);

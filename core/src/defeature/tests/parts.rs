@@ -160,6 +160,23 @@ pub(super) fn shaft(profile: &[[f64; 2]], columns: usize) -> Part {
     part
 }
 
+/// A ring around the z axis, of a closed profile: (radius, height), counter-clockwise.
+pub(super) fn ring(profile: &[[f64; 2]], columns: usize) -> Part {
+    let mut part = Part::default();
+    for (k, low) in profile.iter().enumerate() {
+        let high = profile[(k + 1) % profile.len()];
+        let (below, above) = (circle([0.0; 2], low[0], columns), circle([0.0; 2], high[0], columns));
+        for i in 0..columns {
+            let next = (i + 1) % columns;
+            let [a, b] = [i, next].map(|i| [below[i][0], below[i][1], low[1]]);
+            let [c, d] = [i, next].map(|i| [above[i][0], above[i][1], high[1]]);
+            part.triangle([a, b, d]);
+            part.triangle([a, d, c]);
+        }
+    }
+    part
+}
+
 /// Triangles between outlines: those of the constrained triangulation whose middle lies inside by the even-odd rule.
 fn fill(outlines: &[Outline]) -> Vec<[[f64; 2]; 3]> {
     let mut mesh = ConstrainedDelaunayTriangulation::<Point2<f64>>::new();

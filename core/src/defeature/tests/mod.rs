@@ -1,5 +1,6 @@
 //! Parts made here, without and with a feature.
 
+mod kinds;
 mod parts;
 
 use super::feature::Kind;
@@ -40,7 +41,7 @@ fn is_closed(triangles: &[[[f32; 3]; 3]]) -> bool {
 fn check(part: &Part, kind: Kind, size: f64, volume_left: f64) {
     let edit = defeature(&part.points, &part.triangles, &ALL).unwrap();
     let found: Vec<_> = edit.features.iter().map(|f| (f.kind, f.outcome)).collect();
-    assert_eq!(found, [(kind, Outcome::Removed)]);
+    assert_eq!(found, [(kind, Outcome::Removed)], "{:?}", edit.features);
     assert!((edit.features[0].size - size).abs() < 1e-3 * size, "{}", edit.features[0].size);
     assert!(edit.features[0].confidence > 0.5);
     let left = apply(part, &edit);

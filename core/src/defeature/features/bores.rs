@@ -47,16 +47,20 @@ pub(super) fn find(mesh: &Mesh, segments: &Segments, limits: &Limits, known: &[C
             continue;
         }
         triangles.iter().for_each(|t| is_known[*t as usize] = true);
-        let is_open = gap > ALL_ROUND || !ends_in_ridges(mesh, segments, &triangles);
+        let ends = loops(mesh, &triangles, |t| triangles.binary_search(&t).is_ok());
+        // A cavity is no hole.
+        if ends.is_empty() {
+            continue;
+        }
+        let is_open = gap > ALL_ROUND || !ends_in_ridges(mesh, segments, &ends);
         let hole = if is_open { None } else { classify(mesh, segments, triangles.clone()) };
         let told = Told::new(mesh, segments, segment, &numbers);
         found.push(match hole.filter(|c| c.kind.is_hole()) {
             Some(hole) => told.of((hole.kind, hole.size, hole.confidence), triangles, hole.loops),
             None => {
                 let kind = if told.has_end { Kind::BlindHole } else { Kind::ThroughHole };
-                let rims = loops(mesh, &triangles, |t| triangles.binary_search(&t).is_ok());
                 let sure = patch::confidence(mesh, segments, &numbers);
-                Candidate { barred: Some(Reason::Walls), ..told.of((kind, 2.0 * radius, sure), triangles, rims) }
+                Candidate { barred: Some(Reason::Walls), ..told.of((kind, 2.0 * radius, sure), triangles, ends) }
             }
         });
     }
@@ -101,13 +105,13 @@ fn coaxial(mesh: &Mesh, segments: &Segments, first: u32, (origin, axis, radius):
     found
 }
 
-/// Whether most of a patch's rims are ridges: the faces across them go on over the hole.
-fn ends_in_ridges(mesh: &Mesh, segments: &Segments, triangles: &[u32]) -> bool {
+/// Whether most of the rims' length is a ridge: the faces across them go on over the hole.
+fn ends_in_ridges(mesh: &Mesh, segments: &Segments, rims: &[Vec<u32>]) -> bool {
     let (mut ridge, mut all) = (0.0, 0.0);
-    for half in loops(mesh, triangles, |t| triangles.binary_search(&t).is_ok()).into_iter().flatten() {
-        let length = distance(mesh.at(mesh.from(half)), mesh.at(mesh.to(half)));
+    for half in rims.iter().flatten() {
+        let length = distance(mesh.at(mesh.from(*half)), mesh.at(mesh.to(*half)));
         all += length;
-        ridge += if is_convex(mesh, segments, half) { length } else { 0.0 };
+        ridge += if is_convex(mesh, segments, *half) { length } else { 0.0 };
     }
     ridge >= LEAST_RIDGE * all
 }

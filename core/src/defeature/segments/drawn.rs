@@ -3,7 +3,7 @@
 use super::super::mesh::Mesh;
 use super::super::surface::Surface;
 use super::super::vector::{Point, cross, distance, dot, norm};
-use super::Segment;
+use super::segment::Segment;
 use rayon::prelude::*;
 
 /// Directions of flat faces that single triangles are compared with.

@@ -244,7 +244,7 @@ pub(crate) fn tell(input: &Path, result: &Result<Box<Report>, Failure>, order: &
         }
         (Ok(report), None) => {
             let text = if order.json { serde_json::to_string(&report).unwrap_or_default() + "\n" } else { table::render(report) };
-            (text, None, if report.outcome.is_good() { Exit::Good } else { Exit::NotGood })
+            (text, None, exit_of(report))
         }
         (Err(failure), _) => {
             let line = failure.line.clone();
@@ -257,6 +257,12 @@ pub(crate) fn tell(input: &Path, result: &Result<Box<Report>, Failure>, order: &
             (text, Some(line), failure.exit())
         }
     }
+}
+
+/// Good if the result is, and no feature had to stay because the mesh is not good without it, or for want of memory.
+fn exit_of(report: &Report) -> Exit {
+    let is_in_vain = report.features.as_ref().is_some_and(|features| features.why_not.is_some());
+    if report.outcome.is_good() && !is_in_vain { Exit::Good } else { Exit::NotGood }
 }
 
 /// Whether `certificate` holds for the file that `report` is of, in one line; good only if it says that the file is printable.
@@ -327,7 +333,7 @@ fn check_original(original: &Path, certificate: &Certificate, report: &Report) -
 
 #[cfg(test)]
 mod tests {
-    use suture_core::report::Outcome;
+    use suture_core::report::{Features, Outcome};
 
     use super::*;
 
@@ -348,6 +354,19 @@ mod tests {
         let exit = |class| Failure::new(class, "x").exit();
         assert_eq!([ErrorClass::Shortage, ErrorClass::Unreadable].map(exit), [Exit::TryAgain, Exit::Refused]);
         assert_eq!(Failure { stopped: true, ..Failure::new(ErrorClass::Shortage, "x") }.exit(), Exit::Interrupted);
+    }
+
+    /// A mesh that keeps all of its features is not what was asked for, good as it is.
+    #[test]
+    fn features_that_had_to_stay_are_told_by_the_exit() {
+        let mut report = table::tests::sample(Outcome::Clean);
+        assert_eq!(exit_of(&report), Exit::Good);
+        report.features = Some(Features::default());
+        assert_eq!(exit_of(&report), Exit::Good, "there was none to remove");
+        let mut features = Features::default();
+        features.why_not = Some("without its features the mesh is not good".into());
+        report.features = Some(features);
+        assert_eq!(exit_of(&report), Exit::NotGood);
     }
 
     /// One line each, and only what is certified and the same is good.

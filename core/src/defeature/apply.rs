@@ -1,7 +1,7 @@
 //! Edits chosen and made.
 
 use super::feature::{Feature, Kind, Outcome};
-use super::features::Candidate;
+use super::features::{Candidate, Entry};
 use super::mesh::{DefeatureError, Mesh};
 use super::reason::Reason;
 use super::remove::guard::{Star, closes};
@@ -35,7 +35,8 @@ pub(crate) struct Work {
 
 /// What a round brought.
 pub(crate) struct Round {
-    pub(crate) removed: Vec<Feature>,
+    /// Those of each edit.
+    pub(crate) removed: Vec<Vec<Feature>>,
     pub(crate) left: Vec<Feature>,
     pub(crate) edits: Vec<Edit>,
 }
@@ -64,7 +65,7 @@ impl Work {
             let edit = match plan {
                 Ok(edit) => edit,
                 Err(reason) => {
-                    round.left.push(self.feature(candidate, Outcome::Left(reason)));
+                    round.left.extend(self.features(candidate, Outcome::Left(reason)));
                     continue;
                 }
             };
@@ -74,7 +75,7 @@ impl Work {
                     rim.iter().for_each(|t| state[*t as usize] = HELD);
                     edges.extend(own);
                     edit.removed.iter().for_each(|t| state[*t as usize] = GONE);
-                    round.removed.push(self.feature(candidate, Outcome::Removed));
+                    round.removed.push(self.features(candidate, Outcome::Removed));
                     round.edits.push(edit);
                 }
                 Err(reason) => {
@@ -82,7 +83,7 @@ impl Work {
                     if reason == Reason::Rounds {
                         candidate.triangles.iter().for_each(|t| state[*t as usize] = HELD.max(state[*t as usize]));
                     }
-                    round.left.push(self.feature(candidate, Outcome::Left(reason)));
+                    round.left.extend(self.features(candidate, Outcome::Left(reason)));
                 }
             }
         }
@@ -106,8 +107,8 @@ impl Work {
     }
 
     /// Remembers what was removed.
-    pub(crate) fn note(&mut self, removed: &[Feature]) {
-        self.done.extend(removed.iter().map(|f| (f.kind, f.centre, f.size)));
+    pub(crate) fn note(&mut self, removed: &[Vec<Feature>]) {
+        self.done.extend(removed.iter().flatten().map(|f| (f.kind, f.centre, f.size)));
     }
 
     /// Whether a feature of this kind, place and size was removed before.
@@ -118,12 +119,25 @@ impl Work {
         self.done.iter().any(|(kind, centre, size)| *kind == candidate.kind && near(*centre, *size))
     }
 
-    fn feature(&self, candidate: Candidate, outcome: Outcome) -> Feature {
-        let mut triangles: Vec<u32> =
-            candidate.triangles.iter().map(|t| self.origins[*t as usize]).filter(|t| *t != ADDED).collect();
-        triangles.sort_unstable();
-        let Candidate { kind, centre, axis, size, length, depth, confidence, .. } = candidate;
-        Feature { kind, centre, axis, size, length, depth, confidence, triangles, outcome }
+    /// What is told of a candidate: itself, then what goes with it.
+    fn features(&self, candidate: Candidate, outcome: Outcome) -> Vec<Feature> {
+        let of_input = |triangles: &[u32]| {
+            let mut own: Vec<u32> = triangles.iter().map(|t| self.origins[*t as usize]).filter(|t| *t != ADDED).collect();
+            own.sort_unstable();
+            own
+        };
+        let mut rest = candidate.triangles;
+        let mut kin_own: Vec<u32> = candidate.kin.iter().flat_map(|k| k.triangles.iter().copied()).collect();
+        kin_own.sort_unstable();
+        rest.retain(|t| kin_own.binary_search(t).is_err());
+        let triangles = of_input(&rest);
+        let Candidate { kind, centre, axis, size, length, depth, confidence, kin, .. } = candidate;
+        let mut told = vec![Feature { kind, centre, axis, size, length, depth, confidence, triangles, outcome }];
+        told.extend(kin.into_iter().map(|Entry { kind, centre, axis, size, length, depth, triangles }| {
+            let triangles = of_input(&triangles);
+            Feature { kind, centre, axis, size, length, depth, confidence, triangles, outcome }
+        }));
+        told
     }
 
     /// Makes edits, and gives the segments of the new mesh; leaves everything as it was where the mesh would not be closed and

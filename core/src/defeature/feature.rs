@@ -32,6 +32,14 @@ pub(crate) enum Kind {
     Boss,
 }
 
+impl Kind {
+    /// Whether it is a round hole.
+    pub(crate) fn is_hole(self) -> bool {
+        use Kind::{BlindHole, CounterboredHole, CountersunkHole, Dimple, ThroughHole};
+        matches!(self, ThroughHole | BlindHole | CounterboredHole | CountersunkHole | Dimple)
+    }
+}
+
 /// Whether a feature was removed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Outcome {
@@ -46,18 +54,19 @@ pub(crate) enum Outcome {
 pub(crate) struct Feature {
     /// What it is.
     pub(crate) kind: Kind,
-    /// Its middle: of its rims, of its edge for fillets and chamfers.
+    /// Its middle: of its rims, of its extents for grooves, of its edge for fillets and chamfers.
     pub(crate) centre: Point,
     /// The direction out of the part: of a hole's axis, of a boss; the edge's direction for fillets and chamfers.
     pub(crate) axis: Point,
     /// What its limit is compared with, mm: the largest diameter of holes and dimples, the width of pockets, slots, grooves and
     /// chamfers, the radius of fillets, the height of bosses.
     pub(crate) size: f64,
-    /// The largest extent of its rim, mm; of the edge for fillets and chamfers.
+    /// The largest extent of its rim, mm; of grooves along their walls, of the edge for fillets and chamfers.
     pub(crate) length: f64,
-    /// How far it goes down from its face, mm; 0 for fillets and chamfers.
+    /// How far it goes down from its face, mm; of grooves from their mouth to their floor; 0 for fillets and chamfers.
     pub(crate) depth: f64,
-    /// 1 where all its vertices lie on the surfaces of its kind, falling to 0 at the tolerance.
+    /// 1 where all its vertices lie on the surfaces of its kind, falling to 0 at the tolerance; times the share of its area that is
+    /// no free form.
     pub(crate) confidence: f64,
     /// Numbers of its triangles in the input, rising.
     pub(crate) triangles: Vec<u32>,
@@ -82,12 +91,10 @@ impl Limits {
     /// Whether a size of a kind is below its limit.
     pub(crate) fn takes(&self, kind: Kind, size: f64) -> bool {
         let limit = match kind {
-            Kind::ThroughHole | Kind::BlindHole | Kind::CounterboredHole | Kind::CountersunkHole | Kind::Dimple => {
-                self.holes_below
-            }
+            _ if kind.is_hole() => self.holes_below,
             Kind::Pocket | Kind::Slot | Kind::Groove | Kind::RingGroove => self.grooves_below,
             Kind::Fillet | Kind::Chamfer => self.fillets_below,
-            Kind::Boss => self.bosses_below,
+            _ => self.bosses_below,
         };
         limit.is_some_and(|limit| size < limit)
     }

@@ -90,14 +90,16 @@ pub(crate) fn defeature(points: &[[f32; 3]], triangles: &[[u32; 3]], limits: &Li
             }
         };
         let Some(next) = next else {
-            left.extend(round.removed.into_iter().map(|f| Feature { outcome: Outcome::Left(Reason::NotManifold), ..f }));
+            left.extend(
+                round.removed.into_iter().flatten().map(|f| Feature { outcome: Outcome::Left(Reason::NotManifold), ..f }),
+            );
             break;
         };
         segments = next;
         is_fresh = false;
         round.removed.truncate(count);
         work.note(&round.removed);
-        removed.extend(round.removed);
+        removed.extend(round.removed.into_iter().flatten());
     }
     work.tidy(&segments);
     let (removed_triangles, added) = work.edit();

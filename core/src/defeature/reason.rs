@@ -18,9 +18,12 @@ pub(crate) enum Reason {
     /// The faces' new pieces do not close.
     #[error("the continued faces do not close")]
     Open,
-    /// A face next to it is no plane, cylinder or cone.
-    #[error("a face around it is no plane, cylinder or cone")]
+    /// A face next to it is no plane, cylinder, cone or sphere.
+    #[error("a face around it is no plane, cylinder, cone or sphere")]
     Surface,
+    /// Its wall does not go all around, or is met by other walls.
+    #[error("its wall is open on a side, or other walls meet it")]
+    Walls,
     /// The continued faces would meet other surface.
     #[error("the continued faces would pass through another part of the surface")]
     Pierced,

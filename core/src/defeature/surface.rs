@@ -155,6 +155,9 @@ impl Surface {
                     && (angle - b).abs() * size <= tolerance
                     && norm(sub(*apex, *p)) <= 4.0 * tolerance
             }
+            (Self::Sphere { centre, radius }, Self::Sphere { centre: c, radius: r }) => {
+                (radius - r).abs() <= tolerance && norm(sub(*centre, *c)) <= tolerance
+            }
             _ => false,
         }
     }

@@ -12,7 +12,7 @@ use super::super::sets::Sets;
 use super::super::surface::{Surface, radial};
 use super::super::vector::{Point, cross, distance, dot, mean, norm, sub};
 use super::channels::is_convex;
-use super::patch::{Candidate, confidence, direction, extent};
+use super::patch::{Candidate, Entry, confidence, direction, extent};
 use super::strip::Strip;
 
 /// Cosine of 4°: supports of a fillet touch it within that.
@@ -56,7 +56,7 @@ fn strip(mesh: &Mesh, segments: &Segments, number: u32, kind: Kind) -> Option<St
     let segment = &segments.list[number as usize];
     let is_shape = match segment.surface {
         Surface::Cylinder { .. } | Surface::Torus { .. } => kind == Kind::Fillet,
-        Surface::Plane { .. } => kind == Kind::Chamfer && segment.triangles.len() <= 64,
+        Surface::Plane { .. } => kind == Kind::Chamfer && segment.is_proven && segment.triangles.len() <= 64,
         Surface::Cone { .. } => kind == Kind::Chamfer,
         Surface::Sphere { .. } => false,
     };
@@ -72,7 +72,7 @@ fn strip(mesh: &Mesh, segments: &Segments, number: u32, kind: Kind) -> Option<St
         _ => return None,
     };
     let supports = [support(mesh, segments, &sides[0])?, support(mesh, segments, &sides[1])?];
-    if supports[0] == supports[1] {
+    if supports[0] == supports[1] || supports.iter().any(|s| !segments.list[*s as usize].is_proven) {
         return None;
     }
     let fits = match kind {
@@ -178,7 +178,25 @@ fn bevels(mesh: &Mesh, segments: &Segments, number: u32, sides: &[Vec<u32>; 2], 
         segments.list[supports[k] as usize].outward(mesh.at(mesh.from(half)))
     };
     let is_edge = dot(outward(0), outward(1)) > COS_BEVEL;
-    is_edge && convex(0) == convex(1) && blunt(0) && blunt(1) && large(0) && large(1) && long
+    is_edge
+        && is_even(segments, segment, supports, length(0).max(length(1)), width(mesh, sides))
+        && convex(0) == convex(1)
+        && blunt(0)
+        && blunt(1)
+        && large(0)
+        && large(1)
+        && long
+}
+
+/// Whether a flat chamfer of flat faces is as wide at one end as at the other, within a twentieth: any three planes have two edges.
+fn is_even(segments: &Segments, segment: &Segment, supports: [u32; 2], length: f64, width: Option<f64>) -> bool {
+    let [one, other] = supports.map(|s| segments.list[s as usize].surface);
+    match (segment.surface, one, other, width) {
+        (Surface::Plane { normal, .. }, Surface::Plane { normal: a, .. }, Surface::Plane { normal: b, .. }, Some(width)) => {
+            norm(cross(direction(cross(normal, a)), direction(cross(normal, b)))) * length <= 0.05 * width
+        }
+        _ => true,
+    }
 }
 
 /// The distance of the two rims: the least from the middle of the shorter one to a vertex or edge of the other.
@@ -196,7 +214,11 @@ fn width(mesh: &Mesh, sides: &[Vec<u32>; 2]) -> Option<f64> {
 
 /// Strips and corner pieces that touch, as candidates.
 fn networks(mesh: &Mesh, segments: &Segments, strips: &[Option<Strip>], rounds: &[bool]) -> Vec<Candidate> {
-    let is_corner = |s: u32| strips[s as usize].is_none() && is_corner(mesh, segments, strips, rounds, s);
+    // A bore between the rounded rims at its ends is no corner: they are fillets of it.
+    let mut is_support = vec![false; strips.len()];
+    strips.iter().flatten().flat_map(|strip| strip.supports).for_each(|s| is_support[s as usize] = true);
+    let is_corner =
+        |s: u32| strips[s as usize].is_none() && !is_support[s as usize] && is_corner(mesh, segments, strips, rounds, s);
     let corners: Vec<bool> = (0..strips.len() as u32).map(is_corner).collect();
     let is_piece = |s: u32| strips[s as usize].is_some() || corners[s as usize];
     let mut sets = Sets::new(strips.len());
@@ -209,19 +231,51 @@ fn networks(mesh: &Mesh, segments: &Segments, strips: &[Option<Strip>], rounds: 
     let groups = sets.groups(|_| true);
     let mut found = Vec::new();
     for group in groups.into_iter().filter(|g| g.len() <= MOST_PIECES) {
-        let own: Vec<Strip> = group.iter().filter_map(|s| strips[*s as usize].clone()).collect();
-        let Some(first) = own.iter().max_by(|a, b| a.size.total_cmp(&b.size)) else { continue };
-        let (kind, size) = (first.kind, first.size);
+        let mut own: Vec<Strip> = group.iter().filter_map(|s| strips[*s as usize].clone()).collect();
+        own.sort_by(|a, b| b.size.total_cmp(&a.size));
         let mut triangles: Vec<u32> = group.iter().flat_map(|s| segments.list[*s as usize].triangles.iter().copied()).collect();
         triangles.sort_unstable();
         let loops = loops(mesh, &triangles, |t| triangles.binary_search(&t).is_ok());
-        let points: Vec<Point> = first.rims.iter().flatten().map(|h| mesh.at(mesh.from(*h))).collect();
-        let (centre, axis) = (mean(&points), segments.list[first.segment as usize].surface.axis().map(|(_, axis)| axis));
-        let axis = axis.unwrap_or_else(|| first.rims.first().map_or([0.0; 3], |rim| longest(mesh, rim)));
-        let (length, confidence) = (extent(mesh, &triangles), confidence(mesh, segments, &group));
-        found.push(Candidate { kind, centre, axis, size, length, depth: 0.0, confidence, triangles, loops, strips: own });
+        let confidence = confidence(mesh, segments, &group);
+        let mut kin = kin(mesh, segments, &own);
+        if kin.is_empty() {
+            continue;
+        }
+        let first = kin.remove(0);
+        // Corners belong to the widest.
+        let length = if kin.is_empty() { extent(mesh, &triangles) } else { first.length };
+        let network = Candidate::new(Entry { length, triangles, ..first }, confidence, loops);
+        found.push(Candidate { strips: own, kin, ..network });
     }
     found
+}
+
+/// The fillets and chamfers of a network: strips of one kind and size are one, the widest first.
+fn kin(mesh: &Mesh, segments: &Segments, strips: &[Strip]) -> Vec<Entry> {
+    let mut sorted: Vec<&Strip> = strips.iter().collect();
+    sorted.sort_by(|a, b| b.size.total_cmp(&a.size));
+    let mut groups: Vec<Vec<&Strip>> = Vec::new();
+    for strip in sorted {
+        let is_same = |group: &Vec<&Strip>| {
+            group.first().is_some_and(|first| first.kind == strip.kind && (first.size - strip.size).abs() <= 0.01 * first.size)
+        };
+        match groups.iter_mut().find(|group| is_same(group)) {
+            Some(group) => group.push(strip),
+            None => groups.push(vec![strip]),
+        }
+    }
+    let told = |group: Vec<&Strip>| {
+        let first = group.first()?;
+        let mut triangles: Vec<u32> =
+            group.iter().flat_map(|s| segments.list[s.segment as usize].triangles.iter().copied()).collect();
+        triangles.sort_unstable();
+        let points: Vec<Point> = first.rims.iter().flatten().map(|h| mesh.at(mesh.from(*h))).collect();
+        let axis = segments.list[first.segment as usize].surface.axis().map(|(_, axis)| axis);
+        let axis = axis.unwrap_or_else(|| first.rims.first().map_or([0.0; 3], |rim| longest(mesh, rim)));
+        let (centre, length) = (mean(&points), extent(mesh, &triangles));
+        Some(Entry { kind: first.kind, centre, axis, size: first.size, length, depth: 0.0, triangles })
+    };
+    groups.into_iter().filter_map(told).collect()
 }
 
 /// Whether a segment is the corner between strips: round and small, or flat and small, with nothing but strips along most of

@@ -8,27 +8,39 @@ use super::super::mesh::Mesh;
 use super::super::segments::{Segment, Segments};
 use super::super::sets::Sets;
 use super::super::surface::Surface;
-use super::super::vector::{Point, add, cross, distance, dot, frame, sub};
+use super::super::vector::{Point, add, cross, distance, dot, frame, mean, sub};
 use super::channels::is_convex;
 use super::measure::rim;
 
 /// A face with a hole has six triangles at least.
 const LEAST_TRIANGLES: usize = 6;
+/// Cosine of 40°: rows of facets of a smooth body turn by less, chamfers by 45°.
+const COS_ROW: f64 = 0.766;
 
 /// The pieces without inner loops of their own, each as rising numbers of triangles. O(n log n).
 pub(super) fn pieces(mesh: &Mesh, segments: &Segments, widest: Option<f64>) -> Vec<Vec<u32>> {
     let mut is_cut = vec![false; mesh.triangles.len() * 3];
     let mut cuts = Vec::new();
-    for (number, segment) in segments.list.iter().enumerate() {
-        if segment.triangles.len() < LEAST_TRIANGLES || matches!(segment.surface, Surface::Sphere { .. } | Surface::Torus { .. })
-        {
+    // Spheres come last: what is a loop within another face is none within them.
+    let is_ball = |segment: &Segment| matches!(segment.surface, Surface::Sphere { .. });
+    let faces = || (0_u32..).zip(&segments.list);
+    for (number, segment) in faces().filter(|(_, s)| !is_ball(s)).chain(faces().filter(|(_, s)| is_ball(s))) {
+        if segment.triangles.len() < LEAST_TRIANGLES || matches!(segment.surface, Surface::Torus { .. }) {
             continue;
         }
-        let rims = loops(mesh, &segment.triangles, |t| segments.of[t as usize] == number as u32);
-        if rims.len() < 2 || is_ledge(mesh, segments, &rims, widest) {
+        let rims = loops(mesh, &segment.triangles, |t| segments.of[t as usize] == number);
+        let least = if is_ball(segment) { 1 } else { 2 };
+        if is_ball(segment) && is_row(mesh, segment, &rims) {
             continue;
         }
-        for rim in rims.into_iter().filter(|rim| is_inner(mesh, segment, rim)) {
+        if rims.len() < least || is_ledge(mesh, segments, &rims, widest) {
+            continue;
+        }
+        if segment.surface.is_plane() && is_chord(mesh, segments, segment, &rims) {
+            continue;
+        }
+        let is_new = |rim: &Vec<u32>| rim.iter().all(|half| !is_cut[*half as usize]);
+        for rim in rims.into_iter().filter(|rim| is_inner(mesh, segment, rim)).filter(is_new).collect::<Vec<_>>() {
             for half in &rim {
                 is_cut[*half as usize] = true;
                 is_cut[mesh.twin[*half as usize] as usize] = true;
@@ -66,12 +78,42 @@ fn is_ledge(mesh: &Mesh, segments: &Segments, rims: &[Vec<u32>], widest: Option<
     wide < widest && !is_ridge && is_step && distance(centre, place) < 0.05 * narrow
 }
 
+/// Whether a segment has no vertices but those of its rims: two circles of a cone lie on a sphere, too.
+fn is_row(mesh: &Mesh, segment: &Segment, rims: &[Vec<u32>]) -> bool {
+    let mut own: Vec<u32> = rims.iter().flatten().map(|half| mesh.from(*half)).collect();
+    own.sort_unstable();
+    segment.triangles.iter().flat_map(|t| mesh.triangles[*t as usize]).all(|v| own.binary_search(&v).is_ok())
+}
+
+/// Whether a ring, flat or round, is no face but one row of the facets of a smooth body, as the crest of a lathed one is: it turns into flats
+/// or cones of half to twice its width at all of its rims, by less than 40°.
+pub(super) fn is_chord(mesh: &Mesh, segments: &Segments, face: &Segment, rims: &[Vec<u32>]) -> bool {
+    let length = |half: &u32| distance(mesh.at(mesh.from(*half)), mesh.at(mesh.to(*half)));
+    let outline: f64 = rims.iter().flatten().map(length).sum();
+    let own = 2.0 * face.area / outline.max(1e-300);
+    rims.iter().all(|rim| {
+        let mut beside: Vec<u32> = rim.iter().map(|half| segments.get(mesh.across(*half)).0).collect();
+        beside.sort_unstable();
+        beside.dedup();
+        let parts = || beside.iter().map(|s| &segments.list[*s as usize]);
+        let width = parts().map(|s| s.area).sum::<f64>() / rim.iter().map(length).sum::<f64>().max(1e-300);
+        let is_smooth = |half: &u32| {
+            let middle = mesh.at(mesh.from(*half));
+            dot(face.outward(middle), segments.get(mesh.across(*half)).1.outward(middle)) > COS_ROW
+        };
+        width > 0.5 * own
+            && width < 2.0 * own
+            && parts().all(|s| matches!(s.surface, Surface::Plane { .. } | Surface::Cone { .. }))
+            && rim.iter().all(is_smooth)
+    })
+}
+
 /// Whether a loop bounds its face from within: it turns the other way, and not around a cylinder.
 fn is_inner(mesh: &Mesh, segment: &Segment, rim: &[u32]) -> bool {
     let points: Vec<Point> = rim.iter().map(|half| mesh.at(mesh.from(*half))).collect();
     let pairs = || points.iter().zip(points.iter().cycle().skip(1));
     let Some((origin, axis)) = segment.surface.axis() else {
-        let start = points.first().copied().unwrap_or([0.0; 3]);
+        let start = if matches!(segment.surface, Surface::Sphere { .. }) { mean(&points) } else { points[0] };
         let area = pairs().fold([0.0; 3], |sum, (a, b)| add(sum, cross(sub(*a, start), sub(*b, start))));
         return dot(area, segment.outward(start)) < 0.0;
     };

@@ -1,16 +1,18 @@
 //! Features: small patches of segments whose rims lie on faces that go on beneath.
 //!
 //! **In:** a mesh and its segments. **Out:** candidates, each with its kind, place and size.
-//! Three searches: behind inner loops of faces ([`inner`]), along concave edges ([`channels`]), between two faces ([`blends`]).
+//! Four searches: behind inner loops of faces ([`inner`]), by walls of holes ([`bores`]), along concave edges ([`channels`]), between two
+//! faces ([`blends`]).
 
 mod blends;
+mod bores;
 mod channels;
 mod inner;
 mod measure;
 pub(crate) mod patch;
 mod strip;
 
-pub(crate) use patch::Candidate;
+pub(crate) use patch::{Candidate, Entry};
 
 use super::feature::Limits;
 use super::mesh::Mesh;
@@ -20,6 +22,9 @@ use super::segments::Segments;
 pub(crate) fn find(mesh: &Mesh, segments: &Segments, limits: &Limits) -> Vec<Candidate> {
     let pieces = inner::pieces(mesh, segments, limits.holes_below);
     let mut found: Vec<Candidate> = pieces.into_iter().filter_map(|piece| patch::classify(mesh, segments, piece)).collect();
+    // A bore whose head is too wide to go is none by itself.
+    found.retain(|candidate| candidate.kind.is_hole() || limits.takes(candidate.kind, candidate.size));
+    found.extend(bores::find(mesh, segments, limits, &found));
     found.extend(channels::find(mesh, segments, limits));
     found.extend(blends::find(mesh, segments, limits));
     // What is as small as rounding is none.

@@ -20,6 +20,8 @@ enum MapKind {
     Cut,
     /// A cylinder or cone seen along its axis, the first stretched by exp(height / unit).
     Polar(f64),
+    /// A sphere seen from the point opposite to where the points lie.
+    Stereographic,
 }
 
 impl Map {
@@ -35,7 +37,11 @@ impl Map {
                 let towards = unit(radial(origin, axis, middle)).unwrap_or(frame(axis)[0]);
                 (origin, [towards, cross(axis, towards)])
             }
-            Surface::Sphere { .. } | Surface::Torus { .. } => return None,
+            Surface::Sphere { centre, .. } => {
+                let axes = frame(unit(sub(middle, centre))?);
+                return Some(Self { surface, is_concave, origin: centre, axes, kind: MapKind::Stereographic });
+            }
+            Surface::Torus { .. } => return None,
         };
         let mut map = Self { surface, is_concave, origin, axes, kind: MapKind::Cut };
         let angles: Vec<f64> = points.iter().map(|p| map.angle(*p)).collect();
@@ -88,14 +94,26 @@ impl Map {
                 let turn = self.angle(point) * if kind == MapKind::Cut { angle.sin() } else { 1.0 };
                 [far * turn.cos(), -far * turn.sin()]
             }
+            (_, Surface::Sphere { radius, .. }) => {
+                let d = sub(point, self.origin);
+                let far = 2.0 * radius / (radius + dot(d, cross(self.axes[0], self.axes[1]))).max(1e-300);
+                [far * dot(d, self.axes[0]), far * dot(d, self.axes[1])]
+            }
             _ => [0.0; 2],
         };
         if self.is_concave { [-u, v] } else { [u, v] }
     }
 
-    /// The point of the surface whose image this is, for maps that are cut open.
+    /// The point of the surface whose image this is, for spheres and maps that are cut open.
     pub(super) fn point(&self, [u, v]: [f64; 2]) -> Option<Point> {
         let u = if self.is_concave { -u } else { u };
+        if let Surface::Sphere { radius, .. } = self.surface {
+            let [s, t] = [u, v].map(|x| x / (2.0 * radius));
+            let by = radius / (1.0 + s * s + t * t);
+            let across = add(scale(self.axes[0], 2.0 * s * by), scale(self.axes[1], 2.0 * t * by));
+            let up = scale(cross(self.axes[0], self.axes[1]), by * (1.0 - s * s - t * t));
+            return Some(add(self.origin, add(across, up)));
+        }
         let ((turn, h, r), (_, axis)) = match (self.kind, self.surface) {
             (MapKind::Cut, Surface::Cylinder { radius, .. }) => ((u / radius, v, radius), self.surface.axis()?),
             (MapKind::Cut, Surface::Cone { angle, .. }) => {

@@ -139,7 +139,7 @@ fn steiner(
         };
     }
     let step = match surface {
-        Surface::Cylinder { radius, .. } => radius * angle,
+        Surface::Cylinder { radius, .. } | Surface::Sphere { radius, .. } => radius * angle,
         Surface::Cone { apex, angle: half, .. } => {
             let radii = images.iter().filter_map(|i| map.point(*i)).map(|p| distance(p, apex) * half.sin());
             radii.fold(0.0, f64::max) * angle

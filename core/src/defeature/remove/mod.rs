@@ -27,6 +27,9 @@ const MOST_AVOIDED: usize = 6;
 /// Plans the removal of a candidate. Where an edge of the filling is there already, beside a sliver of the face, flat faces are
 /// made anew as a whole; where that does not help, such edges are divided.
 pub(crate) fn plan(mesh: &Mesh, segments: &Segments, candidate: &Candidate, star: &Star) -> Result<Edit, Reason> {
+    if let Some(reason) = candidate.barred {
+        return Err(reason);
+    }
     let mut trial = Trial::default();
     let first = checked(mesh, segments, candidate, star, &trial);
     let Err((Reason::NotManifold, mut edge)) = first else { return first.map_err(|(reason, _)| reason) };

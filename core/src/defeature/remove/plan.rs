@@ -323,7 +323,7 @@ pub(crate) fn remade(mesh: &Mesh, segments: &Segments, number: u32) -> Option<Ed
 
 /// The largest turn of a segment's triangles around its axis, radians; of 2,000 triangles at most.
 fn turn(mesh: &Mesh, segment: &Segment) -> f64 {
-    if segment.surface.axis().is_none() {
+    if segment.surface.is_plane() {
         return 0.4;
     }
     let triangles = segment.triangles.iter().take(2_000).map(|t| mesh.triangles[*t as usize].map(|v| mesh.at(v)));
@@ -332,8 +332,12 @@ fn turn(mesh: &Mesh, segment: &Segment) -> f64 {
 
 /// The largest turn of an edge of a triangle around a segment's axis, radians.
 fn largest_turn(segment: &Segment, corners: [Point; 3]) -> f64 {
-    let Some((origin, axis)) = segment.surface.axis() else { return 0.0 };
-    let away = corners.map(|p| unit(radial(origin, axis, p)).unwrap_or([0.0; 3]));
+    let away = match (segment.surface, segment.surface.axis()) {
+        (_, Some((origin, axis))) => corners.map(|p| radial(origin, axis, p)),
+        (Surface::Sphere { centre, .. }, _) => corners.map(|p| sub(p, centre)),
+        _ => return 0.0,
+    };
+    let away = away.map(|d| unit(d).unwrap_or([0.0; 3]));
     let turn = |(a, b): (usize, usize)| dot(away[a], away[b]).clamp(-1.0, 1.0).acos();
     [(0, 1), (1, 2), (2, 0)].into_iter().map(turn).fold(0.0, f64::max)
 }

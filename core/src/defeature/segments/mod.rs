@@ -4,11 +4,13 @@
 //! **Promise:** each vertex of a segment lies on its surface within the chord's end tolerance, 4·10⁻⁶ of the part's size or the
 //! rounding of f32. What lies on no round surface is flat, down to single triangles. O(n log n).
 
+mod drawn;
 mod facets;
 mod fit;
 mod hope;
 mod near;
 mod rounds;
+mod segment;
 mod start;
 
 use super::mesh::Mesh;
@@ -16,25 +18,7 @@ use super::sets::Sets;
 use super::surface::Surface;
 use super::vector::{Point, distance, dot};
 use facets::Facets;
-
-/// A piece of the mesh.
-pub(crate) struct Segment {
-    pub(crate) surface: Surface,
-    /// Whether the surface's material lies outside of it: walls of holes.
-    pub(crate) is_concave: bool,
-    pub(crate) triangles: Vec<u32>,
-    pub(crate) area: f64,
-    /// Largest distance of a vertex from the surface.
-    pub(crate) residual: f64,
-}
-
-impl Segment {
-    /// The direction out of the part at a point.
-    pub(crate) fn outward(&self, point: Point) -> Point {
-        let gradient = self.surface.gradient(point);
-        if self.is_concave { gradient.map(|x| -x) } else { gradient }
-    }
-}
+pub(crate) use segment::Segment;
 
 /// Segments, and the one of each triangle.
 pub(crate) struct Segments {
@@ -63,6 +47,7 @@ impl Segments {
                 segments.add(mesh, (Surface::Plane { normal, offset }, false), rest, residual);
             }
         }
+        drawn::prove(mesh, &mut segments.list);
         segments
     }
 
@@ -120,6 +105,7 @@ impl Segments {
             triangles: Vec::new(),
             area: 0.0,
             residual: 0.0,
+            is_proven: s.is_proven,
         };
         let mut list: Vec<Segment> = self.list.iter().map(empty).collect();
         // The largest piece's surface is that of all.
@@ -127,6 +113,7 @@ impl Segments {
         for (segment, root) in self.list.iter().zip(&roots) {
             let place = &mut list[*root as usize];
             place.residual = place.residual.max(segment.residual);
+            place.is_proven |= segment.is_proven;
             if segment.area > largest[*root as usize] {
                 largest[*root as usize] = segment.area;
                 place.surface = segment.surface;
@@ -155,7 +142,20 @@ impl Segments {
         let number = self.list.len() as u32;
         triangles.iter().for_each(|t| self.of[*t as usize] = number);
         let area = triangles.iter().map(|t| mesh.areas[*t as usize]).sum();
-        self.list.push(Segment { surface, is_concave, triangles, area, residual });
+        self.list.push(Segment { surface, is_concave, triangles, area, residual, is_proven: false });
+    }
+
+    /// Whether most of the area of segments lies on surfaces that are proven, and so are all segments along rims.
+    pub(crate) fn are_drawn(&self, mesh: &Mesh, numbers: &[u32], rims: &[Vec<u32>]) -> bool {
+        self.proven_share(numbers) > 0.5 && rims.iter().flatten().all(|half| self.get(mesh.across(*half)).1.is_proven)
+    }
+
+    /// The share of the area of segments that lies on proven surfaces.
+    pub(crate) fn proven_share(&self, numbers: &[u32]) -> f64 {
+        let parts = || numbers.iter().map(|s| &self.list[*s as usize]);
+        let all: f64 = parts().map(|s| s.area).sum();
+        let proven: f64 = parts().filter(|s| s.is_proven).map(|s| s.area).sum();
+        proven / all.max(1e-300)
     }
 
     /// The segment of a triangle.

@@ -5,7 +5,7 @@
 
 use super::super::mesh::Mesh;
 use super::super::surface::{Surface, meridian, radial};
-use super::super::vector::{Point, add, cross, distance, dot, norm, scale, sub, unit};
+use super::super::vector::{Point, add, cross, distance, dot, mean, norm, scale, sub, unit};
 use super::facets::Facets;
 use super::fit::{refine, worst};
 use super::start;
@@ -356,11 +356,13 @@ impl<'a> Rounds<'a> {
     fn deviation(&self, surface: &Surface, facets: &[u32], concave: bool) -> f64 {
         let (mut sum, mut total) = (0.0, 0.0);
         for facet in facets {
-            let (centre, normal) = self.ray(*facet);
-            let area = self.facets.areas[*facet as usize];
-            let cosine = dot(surface.gradient(centre), normal) * if concave { -1.0 } else { 1.0 };
-            sum += area * cosine.clamp(-1.0, 1.0).acos();
-            total += area;
+            let normal = self.facets.normals[*facet as usize];
+            for triangle in self.facets.triangles(*facet) {
+                let area = self.mesh.areas[*triangle as usize];
+                let cosine = dot(surface.gradient(self.mesh.centroid(*triangle)), normal) * if concave { -1.0 } else { 1.0 };
+                sum += area * cosine.clamp(-1.0, 1.0).acos();
+                total += area;
+            }
         }
         sum / f64::max(total, 1e-300)
     }
@@ -413,14 +415,13 @@ impl<'a> Rounds<'a> {
     }
 
     pub(super) fn lies_on(&self, surface: &Surface, facet: u32, concave: bool, limit: f64) -> bool {
-        let (centre, normal) = self.ray(facet);
-        let along = dot(surface.gradient(centre), normal) * if concave { -1.0 } else { 1.0 };
-        if along < COS_NORMAL {
-            return false;
-        }
+        let normal = self.facets.normals[facet as usize];
+        let side = if concave { -1.0 } else { 1.0 };
         self.facets.triangles(facet).iter().all(|t| {
             let corners = self.mesh.triangles[*t as usize].map(|v| self.mesh.at(v));
-            corners.iter().all(|p| surface.distance(*p).abs() <= limit)
+            // The middle of a ring around the axis, the crest of a torus, lies on no surface: each triangle has its own.
+            side * dot(surface.gradient(mean(&corners)), normal) >= COS_NORMAL
+                && corners.iter().all(|p| surface.distance(*p).abs() <= limit)
                 && (0..3).all(|k| {
                     let middle = scale(add(corners[k], corners[(k + 1) % 3]), 0.5);
                     let way = unit(sub(corners[(k + 1) % 3], corners[k])).unwrap_or([0.0; 3]);

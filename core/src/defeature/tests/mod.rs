@@ -1,5 +1,6 @@
 //! Parts made here, without and with a feature.
 
+mod kinds;
 mod parts;
 
 use super::feature::Kind;
@@ -40,7 +41,7 @@ fn is_closed(triangles: &[[[f32; 3]; 3]]) -> bool {
 fn check(part: &Part, kind: Kind, size: f64, volume_left: f64) {
     let edit = defeature(&part.points, &part.triangles, &ALL).unwrap();
     let found: Vec<_> = edit.features.iter().map(|f| (f.kind, f.outcome)).collect();
-    assert_eq!(found, [(kind, Outcome::Removed)]);
+    assert_eq!(found, [(kind, Outcome::Removed)], "{:?}", edit.features);
     assert!((edit.features[0].size - size).abs() < 1e-3 * size, "{}", edit.features[0].size);
     assert!(edit.features[0].confidence > 0.5);
     let left = apply(part, &edit);
@@ -194,6 +195,33 @@ fn a_mesh_with_a_rim_is_refused() {
 fn a_smooth_body_has_no_features() {
     // A wavy ball of latitudes and longitudes, uneven as scans are: patches of it are nearly flat, none is a slot.
     let part = parts::ball(120, |[x, y, z]: [f64; 3]| 50.0 * (1.0 + 0.1 * (3.1 * x + 1.0).sin() * (2.3 * y + 2.0 * z).cos()));
+    assert_eq!(defeature(&part.points, &part.triangles, &ALL).unwrap(), Removed::default());
+}
+
+/// The crest and the foot of a ring are flat where its sections are even: facets of the body, not faces that a hole leads between.
+#[test]
+fn the_throat_of_a_ring_is_no_hole() {
+    for (wide, high, sections) in [(2.0, 2.0, 20), (2.0, 3.0, 20), (3.0, 2.0, 28)] {
+        let section = |k: usize| [std::f64::consts::TAU * (k as f64 + 0.5) / sections as f64].map(f64::sin_cos)[0];
+        let profile: Vec<_> = (0..sections).map(section).map(|(s, c)| [10.0 + wide * c, high * s]).collect();
+        let part = parts::ring(&profile, 48);
+        let limits =
+            Limits { holes_below: Some(50.0), fillets_below: Some(1.0), grooves_below: Some(50.0), bosses_below: Some(50.0) };
+        assert_eq!(defeature(&part.points, &part.triangles, &limits).unwrap(), Removed::default());
+    }
+    // The same throat between flat faces is one.
+    let part = parts::ring(&[[8.0, -2.0], [15.0, -2.0], [15.0, 2.0], [8.0, 2.0]], 48);
+    let edit = defeature(&part.points, &part.triangles, &Limits { holes_below: Some(50.0), ..Limits::default() }).unwrap();
+    assert_eq!(edit.features.iter().map(|f| (f.kind, f.outcome)).collect::<Vec<_>>(), [(Kind::ThroughHole, Outcome::Removed)]);
+}
+
+/// Each valley between triangles of a coarse sculpture has two walls that lean towards each other: three vertices lie on a plane
+/// anywhere.
+#[test]
+fn valleys_of_a_free_form_are_no_grooves() {
+    let part = parts::ball(14, |[x, y, z]: [f64; 3]| {
+        8.0 + 0.7 * (11.3 * x + 1.0).sin() * (9.7 * y + 2.0).cos() + 0.6 * (8.9 * z + 7.1 * x).sin()
+    });
     assert_eq!(defeature(&part.points, &part.triangles, &ALL).unwrap(), Removed::default());
 }
 

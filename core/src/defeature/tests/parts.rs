@@ -16,7 +16,7 @@ pub(super) struct Part {
 
 impl Part {
     fn vertex(&mut self, [x, y, z]: [f64; 3]) -> u32 {
-        let point = [x as f32, y as f32, z as f32];
+        let point = [x as f32, y as f32, z as f32].map(|x| x + 0.0);
         *self.known.entry(point.map(f32::to_bits)).or_insert_with(|| {
             self.points.push(point);
             self.points.len() as u32 - 1
@@ -33,6 +33,17 @@ impl Part {
         for [a, b, c] in fill(outlines) {
             let corners = if is_up { [a, b, c] } else { [a, c, b] };
             self.triangle(corners.map(|[x, y]| [x, y, z]));
+        }
+    }
+
+    /// A ring between two circles of equally many points.
+    fn band(&mut self, low: &Outline, high: &Outline, [z, w]: [f64; 2]) {
+        for k in 0..low.len() {
+            let next = (k + 1) % low.len();
+            let [a, b] = [k, next].map(|k| [low[k][0], low[k][1], z]);
+            let [c, d] = [k, next].map(|k| [high[k][0], high[k][1], w]);
+            self.triangle([a, b, d]);
+            self.triangle([a, d, c]);
         }
     }
 
@@ -155,6 +166,105 @@ pub(super) fn shaft(profile: &[[f64; 2]], columns: usize) -> Part {
             let [c, d] = [k, next].map(|k| [high[k][0], high[k][1], pair[1][1]]);
             part.triangle([a, b, d]);
             part.triangle([a, d, c]);
+        }
+    }
+    part
+}
+
+/// A ring around the z axis, of a closed profile: (radius, height), counter-clockwise.
+pub(super) fn ring(profile: &[[f64; 2]], columns: usize) -> Part {
+    let mut part = Part::default();
+    for (k, low) in profile.iter().enumerate() {
+        let high = profile[(k + 1) % profile.len()];
+        part.band(&circle([0.0; 2], low[0], columns), &circle([0.0; 2], high[0], columns), [low[1], high[1]]);
+    }
+    part
+}
+
+/// A plate with a hole whose edges are bevelled at both ends.
+pub(super) fn bevelled([x, y, z]: [f64; 3], place: [f64; 2], radius: f64, bevel: f64) -> Part {
+    let mut part = Part::default();
+    let (wide, narrow) = (reversed(&circle(place, radius + bevel, 32)), reversed(&circle(place, radius, 32)));
+    part.face(&[rectangle([x, y]), wide.clone()], 0.0, false);
+    part.face(&[rectangle([x, y]), wide.clone()], z, true);
+    part.wall(&rectangle([x, y]), 0.0, z);
+    part.band(&wide, &narrow, [0.0, bevel]);
+    part.wall(&narrow, bevel, z - bevel);
+    part.band(&narrow, &wide, [z - bevel, z]);
+    part
+}
+
+/// A step of 12 by 20 by 3 on a plate of 30 by 20 by 5, and a hole of 2 mm through both, its axis in the step's wall.
+pub(super) fn stepped_hole() -> Part {
+    let mut part = Part::default();
+    let hole = circle([12.0, 10.0], 1.0, 32);
+    let arc = |range: &mut dyn Iterator<Item = usize>| -> Outline { range.map(|k| hole[k % 32]).collect() };
+    let plate = vec![[0.0, 0.0], [12.0, 0.0], [30.0, 0.0], [30.0, 20.0], [12.0, 20.0], [0.0, 20.0]];
+    part.face(&[plate.clone(), reversed(&hole)], 0.0, false);
+    part.wall(&plate, 0.0, 5.0);
+    part.wall(&reversed(&hole), 0.0, 5.0);
+    let mut step = vec![[0.0, 0.0], [12.0, 0.0]];
+    step.extend(arc(&mut (8..=24).rev()));
+    step.extend([[12.0, 20.0], [0.0, 20.0]]);
+    part.wall(&step, 5.0, 8.0);
+    part.face(&[step], 8.0, true);
+    let mut rest = vec![[12.0, 0.0], [30.0, 0.0], [30.0, 20.0], [12.0, 20.0]];
+    rest.extend(arc(&mut (24..=40).rev()));
+    part.face(&[rest], 5.0, true);
+    part
+}
+
+/// A block of 10 by 10 by 6 around the origin, and two bores of 2 mm through it, along x and y: they meet in two ellipses.
+pub(super) fn crossed_bores() -> Part {
+    let mut part = Part::default();
+    let square = vec![[-5.0, -5.0], [5.0, -5.0], [5.0, 5.0], [-5.0, 5.0]];
+    part.face(std::slice::from_ref(&square), 3.0, true);
+    part.face(&[square], -3.0, false);
+    let side = vec![[-5.0, -3.0], [5.0, -3.0], [5.0, 3.0], [-5.0, 3.0]];
+    // Rounding may not part what is one point.
+    let clean = |x: f64| if x.abs() < 1e-9 { 0.0 } else { x };
+    let hole: Outline = circle([0.0; 2], 1.0, 32).into_iter().map(|p| p.map(clean)).collect();
+    for turn in 0..4 {
+        // The side that looks along x, turned around z.
+        let place = |[x, y, z]: [f64; 3]| [[x, y, z], [-y, x, z], [-x, -y, z], [y, -x, z]][turn];
+        for corners in fill(&[side.clone(), reversed(&hole)]) {
+            part.triangle(corners.map(|[y, z]| place([5.0, y, z])));
+        }
+        for k in 0..32 {
+            let [[a, b], [c, d]] = [hole[k], hole[(k + 1) % 32]];
+            let [p, q, r, s] = [[5.0, a, b], [5.0, c, d], [c.abs(), c, d], [a.abs(), a, b]].map(place);
+            for triangle in [[p, q, r], [p, r, s]] {
+                part.triangle(triangle);
+            }
+        }
+    }
+    part
+}
+
+/// Boxes of a grid between planes: those that a test says are there, by their numbers.
+pub(super) fn cells(planes: [&[f64]; 3], is_solid: impl Fn([usize; 3]) -> bool) -> Part {
+    let mut part = Part::default();
+    let count = planes.map(|p| p.len() - 1);
+    let inside = |at: [isize; 3]| {
+        let is_there = (0..3).all(|k| at[k] >= 0 && (at[k] as usize) < count[k]);
+        is_there && is_solid(at.map(|x| x as usize))
+    };
+    for number in 0..count.iter().product::<usize>() {
+        let at = [number % count[0], number / count[0] % count[1], number / count[0] / count[1]].map(|x| x as isize);
+        for (axis, up) in (0..3).flat_map(|axis| [(axis, 0), (axis, 1)]).filter(|_| inside(at)) {
+            let mut beside = at;
+            beside[axis] += 2 * up - 1;
+            if inside(beside) {
+                continue;
+            }
+            let corner = |u: isize, v: isize| {
+                let (mut point, steps) = ([0.0; 3], [up, u, v]);
+                (0..3).for_each(|k| point[(axis + k) % 3] = planes[(axis + k) % 3][(at[(axis + k) % 3] + steps[k]) as usize]);
+                point
+            };
+            let [a, b, c, d] = [corner(0, 0), corner(1, 0), corner(1, 1), corner(0, 1)];
+            let faces = if up == 1 { [[a, b, c], [a, c, d]] } else { [[a, c, b], [a, d, c]] };
+            faces.into_iter().for_each(|face| part.triangle(face));
         }
     }
     part

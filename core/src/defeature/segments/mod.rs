@@ -16,7 +16,7 @@ mod start;
 use super::mesh::Mesh;
 use super::sets::Sets;
 use super::surface::Surface;
-use super::vector::{Point, distance, dot};
+use super::vector::{distance, dot};
 use facets::Facets;
 pub(crate) use segment::Segment;
 

@@ -15,6 +15,7 @@
 //! Triangles whose image is not found, and faces without such a degree, are bounded by [`search`]: a triangle is as near to another one as the
 //! farthest of its corners, as the distance from a convex set is a convex function; else it is halved.
 
+mod again;
 mod chain;
 mod fill;
 mod map;
@@ -31,6 +32,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use crate::geometry::distance::place;
+pub(crate) use crate::proof::again::{Changes, prove_again};
 use crate::proof::map::{BLOCK, Found, Map, covers};
 pub(crate) use crate::proof::pairing::Pairing;
 use crate::proof::rim::Rims;
@@ -62,10 +64,31 @@ pub(crate) struct Proved {
     pub searched: usize,
 }
 
-/// Proves bounds, and names the triangles of the first mesh that are, or may be, farther than `most`, or near to what is, with the bounds there.
-/// O(n) where the meshes are alike.
-/// If it is not to be `tight`, bounds are no better than `most`.
-pub(crate) fn prove(pairing: &Pairing<'_>, most: f64, tight: bool) -> (Proved, Vec<(u32, f64)>) {
+/// The outcome of a proof.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Verdict {
+    pub(crate) proved: Proved,
+    /// Triangles of the first mesh that are, or may be, farther than is wanted, or near to what is, with the bounds there, by number.
+    pub(crate) far: Vec<(u32, f64)>,
+    /// Faces of the second mesh that are, or may be, farther than is wanted.
+    pub(crate) under: Vec<u32>,
+    /// Bounds for all but those that are farther than is wanted.
+    within: [f64; 2],
+}
+
+/// Triangles of the first mesh and faces of the second that are asked about.
+struct Asked<'a> {
+    first: &'a [bool],
+    second: &'a [bool],
+}
+
+/// Proves bounds, and names what is, or may be, farther than `most`. O(n) where the meshes are alike. If it is not to be `tight`, bounds are no better than `most`.
+pub(crate) fn prove(pairing: &Pairing<'_>, most: f64, tight: bool) -> Verdict {
+    prove_of(pairing, None, (most, tight))
+}
+
+/// Proves bounds of all, or of those that are asked about.
+fn prove_of(pairing: &Pairing<'_>, asked: Option<&Asked<'_>>, (most, tight): (f64, bool)) -> Verdict {
     let surface = Surface::new(pairing.new_points, pairing.new_faces);
     let images: Vec<Option<(Spot, f64)>> =
         (0..pairing.points.len()).into_par_iter().with_min_len(BLOCK).map(|v| image(&surface, pairing, v)).collect();
@@ -83,26 +106,36 @@ pub(crate) fn prove(pairing: &Pairing<'_>, most: f64, tight: bool) -> (Proved, V
     let farthest_vertex = images.par_iter().flatten().map(|image| image.1).reduce(|| 0.0, f64::max);
     let least = (farthest_vertex * SLACK).max(rounding);
     let aim = if most.is_finite() && !tight { most } else { least.min(most) };
-    let map = Map { surface: &surface, pairing, images: &images, rim: &rim, covered: &covered, aim };
+    let map = Map {
+        surface: &surface,
+        pairing,
+        images: &images,
+        rim: &rim,
+        covered: &covered,
+        aim,
+        asked: asked.map(|asked| asked.first),
+    };
     let blocks = pairing.faces.len().div_ceil(BLOCK);
     let found: Vec<Found> = (0..blocks).into_par_iter().with_max_len(1).map(|block| map.block(block)).collect();
     let farthest = found.iter().map(|f| f.farthest).fold(0.0, f64::max);
     let failed: Vec<u32> = found.iter().flat_map(|f| f.failed.iter().copied()).collect();
     let mut is_sure: Vec<bool> = covered.par_iter().map(|sum| covers(sum.load(Ordering::Relaxed))).collect();
     found.iter().flat_map(|f| &f.rims).for_each(|face| is_sure[*face as usize] = false);
-    let bare: Vec<u32> = (0..is_sure.len() as u32).filter(|f| !is_sure[*f as usize]).collect();
-    let (forward, mut far) = search::forward(&surface, pairing, &images, &failed, (aim, most));
-    let (backward, under) = search::backward(&surface, pairing, &images, &bare, (aim, most));
-    far.extend(under);
+    let bare = (0..is_sure.len() as u32).filter(|f| !is_sure[*f as usize]);
+    let bare: Vec<u32> = bare.filter(|f| asked.is_none_or(|asked| asked.second[*f as usize])).collect();
+    let forward = search::forward(&surface, pairing, &images, &failed, (aim, most));
+    let backward = search::backward(&surface, pairing, &images, &bare, (aim, most));
+    let mut far = [forward.far, backward.far].concat();
     far.sort_unstable_by(|a, b| a.0.cmp(&b.0).then(b.1.total_cmp(&a.1)));
     far.dedup_by_key(|one| one.0);
     let sure = |d: f64| if d > 0.0 { d * (1.0 + SHARE) + rounding } else { 0.0 };
     let proved = Proved {
-        forward: sure(farthest.max(forward)),
-        backward: sure(farthest.max(backward)),
+        forward: sure(farthest.max(forward.largest)),
+        backward: sure(farthest.max(backward.largest)),
         searched: failed.len() + bare.len(),
     };
-    (proved, far)
+    let within = [forward.within, backward.within].map(|within| sure(farthest.max(within)));
+    Verdict { proved, far, under: backward.under, within }
 }
 
 /// The spot for a vertex: itself if it is still there, else the nearest one of those around what it became, and from there on.

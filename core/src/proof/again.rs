@@ -1,8 +1,8 @@
 //! What is to be proved anew where a few faces of the second mesh have changed since the last proof.
 //!
 //! A place of the first mesh that was near to the second one is so still, unless it was near to a face that is gone: only triangles as near as that to
-//! such a face are asked about. Faces that did not change are as near to the first mesh as before. All this is proved of parts of both meshes: the distance from a part is
-//! not less than that from the whole.
+//! such a face are asked about. Faces that did not change are as near to the first mesh as before. All this is proved of parts of both
+//! meshes: the distance from a part is not less than that from the whole.
 
 use rayon::prelude::*;
 
@@ -11,7 +11,8 @@ use crate::geometry::exact::Point;
 use crate::geometry::sums::Bounds;
 use crate::geometry::tri_tri::Triangle;
 use crate::proof::map::BLOCK;
-use crate::proof::{Asked, Pairing, Proved, Verdict, prove_of};
+use crate::proof::pairing::Pairing;
+use crate::proof::proving::{Asked, Proved, Verdict, prove_of};
 use crate::util::ids::NONE;
 
 /// What has changed since a proof.

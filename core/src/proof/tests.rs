@@ -2,7 +2,7 @@ use crate::geometry::exact::Point;
 use proptest::prelude::*;
 
 use super::*;
-use crate::geometry::distance::square_distance;
+use crate::geometry::distance::{place, square_distance};
 
 /// As many vertices as there are: any of them may be on a rim.
 fn any_of(count: usize) -> Vec<u32> {

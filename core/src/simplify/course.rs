@@ -11,7 +11,7 @@ use crate::simplify::net::{Constraints, Net};
 use crate::simplify::parting::Parting;
 use crate::simplify::partition::Parting as Planes;
 use crate::simplify::rounds::{self, Goal};
-use crate::simplify::{Ended, Input, Options, Outcome};
+use crate::simplify::task::{Ended, Input, Options, Outcome};
 use crate::util::ids::NONE;
 
 /// The largest mean of squared distances from the planes of a quadric, in squares of the deviation that is wanted. A surface goes about three times as far at

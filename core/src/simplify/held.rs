@@ -1,7 +1,7 @@
 //! Vertices that are held back: those that stay, and those for which less is aimed at, since the deviation was missed there.
 
-use crate::simplify::Input;
 use crate::simplify::cell::LIMITS;
+use crate::simplify::task::Input;
 
 /// Vertices that are held back, and more of them with each attempt.
 pub(super) struct Held {

@@ -17,6 +17,7 @@ mod patch;
 mod quadric;
 mod queue;
 mod rounds;
+mod task;
 #[cfg(test)]
 mod tests;
 
@@ -24,9 +25,10 @@ use rayon::prelude::*;
 
 use crate::geometry::exact::Point;
 use crate::geometry::sums::{Bounds, Extent, Measure};
-use crate::proof::{self, Proved};
+use crate::proof;
 use crate::simplify::course::Course;
 use crate::simplify::held::Held;
+pub(crate) use crate::simplify::task::{Ended, Input, Options, Outcome};
 
 /// Faces that a thread measures at once.
 const BLOCK: usize = 1 << 12;
@@ -41,43 +43,6 @@ const MOST_DEVIATION: f64 = 0.01;
 /// Times that places which miss the deviation are done again, at most.
 const ATTEMPTS: usize = 16;
 
-/// A mesh that is to be simplified.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Input<'a> {
-    /// Positions of vertices, finite.
-    pub points: &'a [Point],
-    /// Vertices of faces.
-    pub faces: &'a [[u32; 3]],
-    /// Which faces may change; all of them if it is `None`.
-    pub region: Option<&'a [bool]>,
-    /// Which vertices stay as they are, besides those of faces that may not change.
-    pub fixed: Option<&'a [bool]>,
-}
-
-/// Wishes.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Options {
-    /// Stop at so many triangles.
-    pub triangles: Option<usize>,
-    /// The largest distance between any point of one surface and the other surface, both ways, in the unit of the points. Where only a count is
-    /// given, it is a hundredth of the diagonal of the box around the points; infinity is no bound.
-    pub max_deviation: Option<f64>,
-    /// Edges are features, and stay, where the normals of their triangles differ by more than this angle, in radians.
-    pub feature_angle: Option<f64>,
-    /// A collapse turns no triangle by more than this angle, in radians.
-    pub max_turn: f64,
-    /// New vertices may lie where the quadric is least, besides at the ends and in the middle of an edge.
-    pub optimal: bool,
-    /// Bounds of the deviation are proved, also where none is wanted.
-    pub prove: bool,
-}
-
-impl Default for Options {
-    fn default() -> Self {
-        Self { triangles: None, max_deviation: None, feature_angle: None, max_turn: 1.2, optimal: true, prove: true }
-    }
-}
-
 /// Why nothing was simplified.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
@@ -91,43 +56,6 @@ pub(crate) enum Error {
     /// More corners or vertices than numbers of 32 bits.
     #[error("the mesh is too large")]
     TooLarge,
-}
-
-/// Why no more was simplified.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[non_exhaustive]
-pub(crate) enum Ended {
-    /// The count that was wanted is reached.
-    Count,
-    /// More would deviate too far.
-    Deviation,
-    /// No more edge may collapse: for what stays, the topology, the shape of triangles, or what they would cross.
-    #[default]
-    Edges,
-}
-
-/// The simplified mesh.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct Outcome {
-    /// Positions of vertices.
-    pub points: Vec<Point>,
-    /// Vertices of faces.
-    pub faces: Vec<[u32; 3]>,
-    /// For each face, the input's face that it is, with the same three positions; `u32::MAX` for a new one.
-    pub origins: Vec<u32>,
-    /// For each vertex of the input, the vertex that it has become.
-    pub became: Vec<u32>,
-    /// Bounds of the distance between the two surfaces, proved; `None` if they were not asked for.
-    pub proved: Option<Proved>,
-    /// Why no more was simplified.
-    pub ended: Ended,
-    /// The volume before and after, signed, as seen from the middle of the input's box; it means something where the surface is closed.
-    pub volume: [f64; 2],
-    /// Cells that were done again with exact tests of each collapse, since triangles crossed in them.
-    #[allow(dead_code, reason = "tests count them")]
-    pub redone: usize,
-    /// How often something was done, with less and less aimed at where the deviation was missed, until it was kept.
-    pub attempts: usize,
 }
 
 /// Simplifies a mesh. O(n log n), 150 bytes a triangle.

@@ -12,9 +12,9 @@ use crate::geometry::distance::place;
 use crate::geometry::exact::Point;
 use crate::geometry::sums::Bounds;
 use crate::geometry::tri_tri::{Triangle, do_cross};
-use crate::simplify::Input;
 use crate::simplify::net::Net;
 use crate::simplify::patch::{FIXED, RIM};
+use crate::simplify::task::Input;
 use crate::util::ids::NONE;
 
 /// A triangle flatter than this share of an equilateral one, squared, is none.

@@ -63,6 +63,7 @@ pub(crate) struct Outcome {
     /// For each face, the input's face that it is, with the same three positions; `u32::MAX` for a new one.
     pub origins: Vec<u32>,
     /// For each vertex of the input, the vertex that it has become.
+    #[allow(dead_code, reason = "tests prove by it")]
     pub became: Vec<u32>,
     /// Bounds of the distance between the two surfaces, proved; `None` if they were not asked for.
     pub proved: Option<Proved>,

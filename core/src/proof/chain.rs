@@ -19,7 +19,7 @@ pub(super) struct Pair {
 }
 
 /// Faces looked at, at most.
-const MOST: usize = 160;
+const MOST: usize = 64;
 
 /// A face on the way.
 #[derive(Clone, Copy)]

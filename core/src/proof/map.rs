@@ -40,6 +40,8 @@ pub(super) struct Map<'m> {
     pub(super) rim: &'m Rims,
     pub(super) covered: &'m [AtomicI64],
     pub(super) aim: f64,
+    /// The triangles that are asked about, if not all: the others only cover faces.
+    pub(super) asked: Option<&'m [bool]>,
 }
 
 /// Lists lent to many triangles.
@@ -57,29 +59,39 @@ impl Map<'_> {
     pub(super) fn block(&self, block: usize) -> Found {
         let (mut found, mut lent) = (Found::default(), Scratch::default());
         for f in block * BLOCK..self.pairing.faces.len().min((block + 1) * BLOCK) {
-            let face = self.pairing.faces[f];
-            let [Some(a), Some(b), Some(c)] = face.map(|v| self.images[v as usize]) else {
-                found.failed.push(f as u32);
-                continue;
-            };
-            let farthest = a.1.max(b.1).max(c.1);
-            if let Some(common) =
-                self.surface.common([&a.0, &b.0, &c.0].into_iter()).filter(|_| self.keeps_rim(face, [a.0, b.0, c.0]))
-            {
-                add(self.surface, self.covered, common, &[a.0, b.0, c.0]);
-                if farthest > self.aim {
-                    found.failed.push(f as u32);
-                    found.rims.push(common);
-                } else {
-                    found.farthest = found.farthest.max(farthest);
-                }
-            } else if let Some((lone, pairs)) = self.over_edge(face, &[a, b, c]) {
-                self.in_two([a, b, c], (lone, pairs), f as u32, &mut found);
-            } else {
-                self.across(f as u32, (face, [a, b, c]), &mut lent, &mut found);
+            let failed = found.failed.len();
+            self.triangle(f, &mut lent, &mut found);
+            if self.asked.is_some_and(|asked| !asked[f]) {
+                found.failed.truncate(failed);
             }
         }
         found
+    }
+
+    /// Maps one triangle.
+    #[inline]
+    fn triangle(&self, f: usize, lent: &mut Scratch, found: &mut Found) {
+        let face = self.pairing.faces[f];
+        let [Some(a), Some(b), Some(c)] = face.map(|v| self.images[v as usize]) else {
+            found.failed.push(f as u32);
+            return;
+        };
+        let farthest = a.1.max(b.1).max(c.1);
+        if let Some(common) =
+            self.surface.common([&a.0, &b.0, &c.0].into_iter()).filter(|_| self.keeps_rim(face, [a.0, b.0, c.0]))
+        {
+            add(self.surface, self.covered, common, &[a.0, b.0, c.0]);
+            if farthest > self.aim {
+                found.failed.push(f as u32);
+                found.rims.push(common);
+            } else {
+                found.farthest = found.farthest.max(farthest);
+            }
+        } else if let Some((lone, pairs)) = self.over_edge(face, &[a, b, c]) {
+            self.in_two([a, b, c], (lone, pairs), f as u32, found);
+        } else {
+            self.across(f as u32, (face, [a, b, c]), lent, found);
+        }
     }
 
     /// Do the sides that are of the rim go onto edges?

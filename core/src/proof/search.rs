@@ -103,8 +103,26 @@ fn bounds(wanted: &[[DVec3; 3]], near: &[[Point; 3]], all: &[[u32; 3]], points: 
     bounds
 }
 
-/// Triangles of the first mesh, and the bounds of what is far there.
-pub(super) type Far = Vec<(u32, f64)>;
+/// Bounds of many triangles.
+#[derive(Default)]
+pub(super) struct Bounded {
+    /// The largest one.
+    pub(super) largest: f64,
+    /// The largest one of those that are far enough in.
+    pub(super) within: f64,
+    /// Triangles of the first mesh, and the bounds of what is beyond there.
+    pub(super) far: Vec<(u32, f64)>,
+    /// Faces of the second mesh that are beyond.
+    pub(super) under: Vec<u32>,
+}
+
+impl Bounded {
+    fn new(bounds: &[f64], most: f64) -> Self {
+        let [largest, within] =
+            [f64::INFINITY, most].map(|most| bounds.iter().filter(|d| **d <= most).copied().fold(0.0, f64::max));
+        Self { largest, within, ..Self::default() }
+    }
+}
 
 /// Bounds the distance of triangles of the first mesh, and names those beyond the second of `aims`.
 pub(super) fn forward(
@@ -113,9 +131,9 @@ pub(super) fn forward(
     images: &[Option<(Spot, f64)>],
     failed: &[u32],
     (aim, most): (f64, f64),
-) -> (f64, Far) {
+) -> Bounded {
     if failed.is_empty() {
-        return (0.0, Vec::new());
+        return Bounded::default();
     }
     let own = failed.iter().flat_map(|f| pairing.faces[*f as usize]);
     let mut is_near = vec![false; surface.faces.len()];
@@ -126,7 +144,7 @@ pub(super) fn forward(
     let wanted: Vec<_> = failed.iter().map(triangle).collect();
     let bounds = bounds(&wanted, &near, surface.faces, surface.points, (aim, most));
     let far = failed.iter().copied().zip(bounds.iter().copied()).filter(|(_, bound)| *bound > most).collect();
-    (bounds.into_iter().fold(0.0, f64::max), far)
+    Bounded { far, ..Bounded::new(&bounds, most) }
 }
 
 /// These faces and all around their vertices.
@@ -146,9 +164,9 @@ pub(super) fn backward(
     images: &[Option<(Spot, f64)>],
     bare: &[u32],
     (aim, most): (f64, f64),
-) -> (f64, Far) {
+) -> Bounded {
     if bare.is_empty() {
-        return (0.0, Vec::new());
+        return Bounded::default();
     }
     let mut is_bare = vec![false; surface.faces.len()];
     bare.iter().for_each(|f| is_bare[*f as usize] = true);
@@ -160,10 +178,11 @@ pub(super) fn backward(
     let near: Vec<_> = pairing.faces.par_iter().filter(|face| lies_on(face, &is_near)).map(corners).collect();
     let wanted: Vec<_> = bare.iter().map(|f| surface.corners(*f)).collect();
     let bounds = bounds(&wanted, &near, pairing.faces, pairing.points, (aim, most));
-    let all = bounds.iter().copied().fold(0.0, f64::max);
-    if all <= most {
-        return (all, Vec::new());
+    let all = Bounded::new(&bounds, most);
+    if all.largest <= most {
+        return all;
     }
+    let under = bare.iter().copied().zip(&bounds).filter(|(_, bound)| **bound > most).map(|(f, _)| f).collect();
     let (mut of_faces, mut of_vertices) = (vec![0.0_f64; surface.faces.len()], vec![0.0_f64; surface.points.len()]);
     for (f, bound) in bare.iter().zip(&bounds).filter(|(_, bound)| **bound > most) {
         of_faces[*f as usize] = *bound;
@@ -177,5 +196,5 @@ pub(super) fn backward(
         pairing.became.get(v as usize).and_then(|w| of_vertices.get(*w as usize)).map_or(on, |of| on.max(*of))
     };
     let far = (0..).zip(pairing.faces).map(|(f, face)| (f, face.map(of_vertex).into_iter().fold(0.0, f64::max)));
-    (all, far.filter(|(_, bound)| *bound > most).collect())
+    Bounded { far: far.filter(|(_, bound)| *bound > most).collect(), under, ..all }
 }

@@ -2,7 +2,7 @@ use crate::geometry::exact::Point;
 use proptest::prelude::*;
 
 use super::*;
-use crate::geometry::distance::square_distance;
+use crate::geometry::distance::{place, square_distance};
 
 /// As many vertices as there are: any of them may be on a rim.
 fn any_of(count: usize) -> Vec<u32> {
@@ -42,7 +42,8 @@ fn a_mesh_is_at_no_distance_from_itself() {
         became: &became,
         open: &any_of(points.len()),
     };
-    assert_eq!(prove(&pairing, f64::INFINITY, true), (Proved::default(), Vec::new()));
+    let verdict = prove(&pairing, f64::INFINITY, true);
+    assert_eq!((verdict.proved, verdict.far, verdict.under), (Proved::default(), Vec::new(), Vec::new()));
 }
 
 /// A square pyramid of height 1, and its base: the tip is at distance 1, and so is the middle of the base, or nearer to the sides.
@@ -60,7 +61,7 @@ fn a_tent_is_as_far_from_the_ground_as_it_is_high() {
         became: &became,
         open: &any_of(points.len()),
     };
-    let (proved, _) = prove(&pairing, f64::INFINITY, true);
+    let Verdict { proved, .. } = prove(&pairing, f64::INFINITY, true);
     assert!((proved.forward - 1.0).abs() < 1e-6, "{proved:?}");
     // 9∕√82 from the middle to a side.
     assert!(proved.backward >= 9.0 / 82.0_f64.sqrt() && proved.backward <= 1.0 + 1e-6, "{proved:?}");
@@ -80,7 +81,7 @@ fn what_is_not_covered_is_found() {
         became: &became,
         open: &any_of(points.len()),
     };
-    let (proved, _) = prove(&pairing, f64::INFINITY, true);
+    let Verdict { proved, .. } = prove(&pairing, f64::INFINITY, true);
     assert_eq!(proved.forward, 0.0);
     assert!((2.0..2.01).contains(&proved.backward), "{proved:?}");
 }
@@ -105,13 +106,47 @@ proptest! {
         let near = |i: u32| (i % 5).div_ceil(2) + (i / 5).div_ceil(2) * 3;
         let became: Vec<u32> = (0..25).map(|i| if random { became[i as usize] } else { near(i) }).collect();
         let pairing = Pairing { points: &points, faces: &faces, new_points: &new_points, new_faces: &new_faces, became: &became, open: &any_of(points.len()) };
-        let (proved, far) = prove(&pairing, f64::INFINITY, true);
+        let Verdict { proved, far, .. } = prove(&pairing, f64::INFINITY, true);
         let there = sampled(&points, &faces, (&new_points, &new_faces));
         let back = sampled(&new_points, &new_faces, (&points, &faces));
         prop_assert!(there <= proved.forward && back <= proved.backward, "{} {} {:?}", there, back, proved);
         prop_assert!(far.is_empty());
-        let (_, far) = prove(&pairing, 0.5 * there, false);
+        let Verdict { far, .. } = prove(&pairing, 0.5 * there, false);
         prop_assert!(there == 0.0 || !far.is_empty());
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(200))]
+    /// One vertex of the second mesh goes elsewhere: what is proved of the faces around it, with what was proved before, holds for all.
+    #[test]
+    fn what_is_proved_anew_holds_with_what_was_proved_before(
+        heights in prop::collection::vec(0u8..8, 49),
+        others in prop::collection::vec(0u8..8, 16),
+        (moved, height) in (0u32..16, 0u8..8),
+        most in 0.01..2.0,
+        tight in any::<bool>(),
+    ) {
+        let (points, faces) = grid(6, |i| f32::from(heights[i as usize]) / 4.0);
+        let (coarse, new_faces) = grid(3, |i| f32::from(others[i as usize]) / 4.0);
+        let before: Vec<Point> = coarse.iter().map(|p| [2.0 * p[0], 2.0 * p[1], p[2]]).collect();
+        let mut after = before.clone();
+        after[moved as usize][2] = f32::from(height) / 4.0;
+        let became: Vec<u32> = (0..49_u32).map(|i| (i % 7).div_ceil(2) + (i / 7).div_ceil(2) * 4).collect();
+        let open = any_of(points.len());
+        let pairing = |new_points| Pairing { points: &points, faces: &faces, new_points, new_faces: &new_faces, became: &became, open: &open };
+        let verdict = prove(&pairing(&before), most, tight);
+        let is_under = |f: usize| verdict.under.contains(&(f as u32));
+        let is_fresh: Vec<bool> = new_faces.iter().enumerate().map(|(f, face)| face.contains(&moved) || is_under(f)).collect();
+        let gone = new_faces.iter().zip(&is_fresh).filter(|(_, is)| **is).map(|(face, _)| face.map(|v| before[v as usize])).collect();
+        let again = prove_again(&pairing(&after), &Changes { gone, is_fresh, verdict: &verdict }, (most, tight));
+        let there = sampled(&points, &faces, (&after, &new_faces));
+        let back = sampled(&after, &new_faces, (&points, &faces));
+        prop_assert!(there <= again.proved.forward && back <= again.proved.backward, "{} {} {:?}", there, back, again);
+        prop_assert!(there <= most || !again.far.is_empty());
+        prop_assert!(back <= most || !again.under.is_empty());
+        // Without what is far, the bounds are those of the rest.
+        prop_assert!(again.within.iter().all(|d| *d <= most));
     }
 }
 
@@ -127,7 +162,7 @@ fn a_rim_goes_onto_the_rim() {
     let open = any_of(points.len());
     let pairing =
         Pairing { points: &points, faces: &faces, new_points: &new_points, new_faces: &new_faces, became: &became, open: &open };
-    let (proved, _) = prove(&pairing, f64::INFINITY, true);
+    let Verdict { proved, .. } = prove(&pairing, f64::INFINITY, true);
     assert!(proved.forward < 1e-9 && proved.backward < 1e-9 && proved.searched == 0, "{proved:?}");
 }
 
@@ -147,7 +182,7 @@ fn a_triangle_covers_vertices_of_a_finer_surface() {
             became: &became,
             open: &open,
         };
-        let (proved, _) = prove(&pairing, f64::INFINITY, true);
+        let Verdict { proved, .. } = prove(&pairing, f64::INFINITY, true);
         assert!(proved.forward < 1e-9 && proved.backward < 1e-9 && proved.searched == 0, "{proved:?}");
     }
 }
@@ -161,7 +196,8 @@ fn what_is_far_is_named_though_nothing_lies_on_it() {
     let (became, open) = ([0, 1, 2, 3], any_of(points.len()));
     let pairing =
         Pairing { points: &points, faces: &faces, new_points: &new_points, new_faces: &new_faces, became: &became, open: &open };
-    let (proved, far) = prove(&pairing, 1.0, false);
+    let Verdict { proved, far, under, .. } = prove(&pairing, 1.0, false);
     assert!(proved.backward >= 5.0, "{proved:?}");
     assert!(far.len() == 2 && (0..).zip(&far).all(|(f, one)| one.0 == f && one.1 > 4.999), "{far:?}");
+    assert_eq!(under, [2]);
 }

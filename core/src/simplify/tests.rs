@@ -3,6 +3,7 @@ use proptest::prelude::*;
 use super::*;
 use crate::geometry::self_crossing::{SelfCrossing, self_crossing};
 use crate::geometry::tri_tri::Triangle;
+use crate::util::ids::NONE;
 use crate::util::parallel::in_pool;
 
 /// A torus of n × n squares with bumps of a height.
@@ -70,6 +71,35 @@ fn a_deviation_is_kept_and_a_larger_one_leaves_less() {
         outcome.faces.len()
     });
     assert!(left[0] > left[1] && left[1] > left[2] && left[2] < faces.len() / 3, "{left:?}");
+}
+
+/// Where the deviation was missed, something is done again, and the mesh stays one that is closed and does not cross itself; a proof of all of it says
+/// what the proofs of its parts said.
+#[test]
+fn places_that_miss_a_deviation_are_done_again() {
+    let (points, faces) = torus(60, 0.3);
+    let open: Vec<u32> = (0..points.len() as u32).collect();
+    for (wanted, most) in [(None, 0.1), (Some(900), 0.1)] {
+        let options = Options { triangles: wanted, max_deviation: Some(most), ..Options::default() };
+        let with = |threads: usize| in_pool(threads, || in_cells(&all(&points, &faces), &options, 300).unwrap());
+        let outcome = with(1);
+        assert!(outcome.attempts > 1, "nothing was missed");
+        assert!(is_closed(&outcome.faces) && outcome.points.len() == outcome.faces.len() / 2, "a torus");
+        assert_eq!(self_crossing(&triangles(&outcome.points, &outcome.faces), u64::MAX), SelfCrossing::None);
+        let pairing = proof::Pairing {
+            points: &points,
+            faces: &faces,
+            new_points: &outcome.points,
+            new_faces: &outcome.faces,
+            became: &outcome.became,
+            open: &open,
+        };
+        let proved = [outcome.proved.unwrap(), proof::prove(&pairing, most, false).proved];
+        assert!(proved.iter().all(|proved| proved.forward.max(proved.backward) <= most), "{proved:?}");
+        assert!(outcome.faces.len() < faces.len() / 3, "{}", outcome.faces.len());
+        let four = with(4);
+        assert_eq!((outcome.points, outcome.faces, outcome.became), (four.points, four.faces, four.became));
+    }
 }
 
 /// The first round has a margin above the whole, and nothing to do; half of the mesh stays, and is not counted on.

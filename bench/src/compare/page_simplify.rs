@@ -42,8 +42,8 @@ fn row(runs: &[&Simplified], ours: &[&Simplified]) -> String {
     let spread = |runs: &[&Simplified], value: fn(&Simplified) -> Option<f64>| {
         Spread::of(runs.iter().filter(|run| run.failure.is_empty()).filter_map(|run| value(run)))
     };
-    let (wall, alone): (fn(&Simplified) -> _, fn(&Simplified) -> _) =
-        (|run| Some(run.cost.wall_seconds), |run| run.core_seconds());
+    let wall: fn(&Simplified) -> Option<f64> = |run| Some(run.cost.wall_seconds);
+    let alone: fn(&Simplified) -> Option<f64> = |run| run.core_seconds();
     let times = |value: fn(&Simplified) -> Option<f64>| {
         let (theirs, own) = (spread(runs, value)?, spread(ours, value)?);
         Some(number(theirs.median / own.median))

@@ -47,9 +47,9 @@ pub(crate) fn write(
     let corners = |numbers: &[u32; 3]| numbers.map(|number| points.get(number as usize).copied().unwrap_or_default());
     let mut triangles: Vec<[[f32; 3]; 3]> = filled.mesh.triangles.iter().map(corners).collect();
     let (mut closed_as_holes, mut open) = (Vec::new(), Vec::new());
-    for (number, surface) in filled.surfaces.iter().enumerate() {
+    for (number, (surface, report)) in filled.surfaces.iter().zip(&filled.reports).enumerate() {
         let Surface::Fallback(rings) = surface else { continue };
-        match closed(rings, &points) {
+        match closed(rings, &points, report.is_flipped) {
             Some(patch) => {
                 triangles.extend(patch);
                 closed_as_holes.push(number);
@@ -94,11 +94,14 @@ fn first_problem(filled: &Filled) -> String {
     format!("outline {number}: {why}")
 }
 
-/// Triangles that close a ring of points as a hole of a mesh, turned as the ring runs.
-fn closed(rings: &[Vec<u32>], points: &[[f32; 3]]) -> Option<Vec<[[f32; 3]; 3]>> {
+/// Triangles that close a ring of points as a hole of a mesh, turned as the ring runs, or the other way.
+fn closed(rings: &[Vec<u32>], points: &[[f32; 3]], is_flipped: bool) -> Option<Vec<[[f32; 3]; 3]>> {
     let [ring] = rings else { return None };
     let mut around: Vec<[f32; 3]> = ring.iter().filter_map(|number| points.get(*number as usize)).copied().collect();
     around.dedup();
+    if is_flipped {
+        around.reverse();
+    }
     let rim = Rim { points: &around, apexes: &[], obstacles: &[], forbidden: &|_, _| false };
     let patch = triangulate(&rim, &FillSettings::default()).ok()?;
     Some(patch.triangles.iter().map(|triangle| rim.corners(*triangle)).collect())

@@ -13,6 +13,7 @@ use super::orient;
 use super::patch::{Patch, Task};
 use super::poor::Split;
 use super::report::{Report, Surface};
+use super::space;
 use super::strand::Strand;
 use super::tangent::{self, Beside};
 use super::tried::Tried;
@@ -277,7 +278,7 @@ fn collected(
         filled.surfaces.push(patch.surface);
         filled.reports.push(patch.report);
     }
-    let flipped = orient::flipped(&filled.mesh, outlines.len());
+    let flipped = flipped(&mut filled);
     for (triangle, face) in filled.mesh.triangles.iter_mut().zip(&filled.mesh.face_of) {
         if flipped.get(*face as usize) == Some(&true) {
             triangle.swap(1, 2);
@@ -286,6 +287,27 @@ fn collected(
     filled.curves = used(strands, outlines, &filled.surfaces);
     filled.reports.iter_mut().zip(flipped).for_each(|(report, is_flipped)| report.is_flipped = is_flipped);
     Ok(filled)
+}
+
+/// Which outlines to turn over; those without a surface count as if they had a lid.
+fn flipped(filled: &mut Filled) -> Vec<bool> {
+    let Filled { surfaces, mesh, .. } = filled;
+    let (points, triangles) = (mesh.points.len(), mesh.triangles.len());
+    for (number, surface) in surfaces.iter().enumerate() {
+        let Surface::Fallback(rings) = surface else { continue };
+        for ring in rings {
+            let places: Vec<Point> = ring.iter().filter_map(|place| mesh.points.get(*place as usize)).copied().collect();
+            let top = mesh.points.len() as u32;
+            mesh.points.push(space::mean(&places));
+            mesh.triangles.extend(ring.iter().zip(ring.iter().cycle().skip(1)).map(|(a, b)| [*a, *b, top]));
+        }
+        mesh.face_of.resize(mesh.triangles.len(), number as u32);
+    }
+    let flipped = orient::flipped(mesh, surfaces.len());
+    mesh.points.truncate(points);
+    mesh.triangles.truncate(triangles);
+    mesh.face_of.truncate(triangles);
+    flipped
 }
 
 fn strands<'a>(shapes: &[&'a Shape], outlines: &[Outline]) -> Result<Strands<'a>, FillError> {
@@ -310,4 +332,31 @@ fn used(strands: Strands<'_>, outlines: &[Outline], surfaces: &[Surface]) -> Vec
     }
     let spline = |(strand, is_used): (Option<Strand<'_>>, bool)| strand.filter(|_| is_used)?.into_fitted();
     strands.into_iter().zip(is_used).map(spline).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A tetrahedron whose last face has no surface: the others face outwards all the same, and it is to be closed the way that agrees with them.
+    #[test]
+    fn outlines_without_a_surface_count_for_what_is_outside() {
+        let points = vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        let plane = Surface::Heights(crate::curves::Frame::around([0.0; 3], [0.0, 0.0, 1.0]));
+        for (is_inward, is_ring_turned) in [(false, false), (true, false), (false, true), (true, true)] {
+            let mut triangles = vec![[0, 2, 1], [0, 1, 3], [0, 3, 2]];
+            let mut ring = vec![1, 2, 3];
+            if is_inward {
+                triangles.iter_mut().for_each(|triangle| triangle.swap(1, 2));
+            }
+            if is_ring_turned {
+                ring.reverse();
+            }
+            let surfaces = vec![plane.clone(), plane.clone(), plane.clone(), Surface::Fallback(vec![ring])];
+            let mesh = Mesh { points: points.clone(), triangles, face_of: vec![0, 1, 2] };
+            let mut filled = Filled { surfaces, mesh: mesh.clone(), ..Filled::default() };
+            assert_eq!(flipped(&mut filled), [is_inward, is_inward, is_inward, is_ring_turned]);
+            assert_eq!(filled.mesh, mesh);
+        }
+    }
 }

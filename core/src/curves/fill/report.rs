@@ -116,7 +116,7 @@ pub struct Report {
     /// Whether other simple surfaces have the same outline: its curve is a circle, or its curves are two circles around one axis, and the file says no surface; or
     /// that is a sphere or a torus, and the file does not say on which side of the outline.
     pub is_ambiguous: bool,
-    /// Whether triangles run against the direction of the outline, so that they agree with those of other outlines.
+    /// Whether triangles run against the direction of the outline, or would, so that they agree with those of other outlines.
     pub is_flipped: bool,
     /// Triangles below 0.4 (twice the ratio of the radii of their inner and outer circles) at corners below 15° of the outline, or of one
     /// of the surfaces to a centre that its curves have.

@@ -242,6 +242,18 @@ fn as_text(args: &FillCurvesArgs, done: &Done) -> String {
             lines.push(format!("  lost    {} too small for single precision", words::triangles(mesh.too_small)));
         }
     }
+    let mut unused: BTreeMap<&str, u64> = BTreeMap::new();
+    for (number, report) in filled.faces.iter().zip(&filled.filled.reports).filter(|(_, report)| !report.is_told) {
+        let surface = network.faces.get(*number).map_or("", |face| face.surface.as_str());
+        // The plane of its curves is the plane that a file says.
+        if !surface.is_empty() && report.method != Method::Plane {
+            *unused.entry(surface).or_default() += 1;
+        }
+    }
+    if !unused.is_empty() {
+        let all = unused.iter().map(|(surface, count)| format!("{count} × {surface}")).collect::<Vec<_>>().join(", ");
+        lines.push(format!("  unused  surfaces of the file: {all}; their outlines are filled by their curves alone"));
+    }
     let unsure = filled.filled.reports.iter().filter(|report| report.is_ambiguous).count() as u64;
     if unsure > 0 {
         let of = Counted(unsure, "outline", "outlines");
@@ -253,6 +265,7 @@ fn as_text(args: &FillCurvesArgs, done: &Done) -> String {
     if let Some(mesh) = mesh {
         let verdict = &mesh.report.verdict;
         lines.push(format!("  verdict {}: {}", if verdict.good { "good" } else { "not good" }, verdict.statement));
+        lines.extend(verdict.reasons.iter().take(LISTED).map(|reason| format!("          {reason}")));
     }
     lines.iter().map(|line| plain(line) + "\n").collect()
 }

@@ -42,6 +42,8 @@ pub struct Face {
     pub inner: Vec<Vec<Use>>,
     /// Whether no boundary trims its surface.
     pub is_untrimmed: bool,
+    /// Whether it bounds a void of a solid: the solid is around it.
+    pub is_void: bool,
 }
 
 /// Curves and faces of a file.

@@ -18,6 +18,8 @@ pub struct FilledNetwork {
     pub added: Vec<Shape>,
     /// What was filled; numbers of curves are those of the network, and go on with those that close gaps or divide.
     pub outlines: Vec<Outline>,
+    /// The number of the face of each; none of loops.
+    pub faces: Vec<usize>,
     /// What came of each.
     pub filled: Filled,
     /// Numbers of the faces of which nothing is known that could be filled: no curve bounds them, and they are no whole sphere or torus.
@@ -49,13 +51,14 @@ pub fn fill_network(
 /// As [`fill_network`], with the threads that there are.
 fn all(network: &Network, (from_faces, how): (bool, &loops::Options), options: &Options) -> Result<FilledNetwork, FillError> {
     if from_faces && !network.faces.is_empty() {
-        let faces::Faces { outlines, told, added, bare } = faces::outlines(network, how, options.told);
+        let faces::Faces { outlines, origins, added, bare } = faces::outlines(network, how, options.told);
         // Of a file whose faces no curve bounds, the loops of its other curves are all that there is.
         if !outlines.is_empty() {
             let shapes: Vec<&Shape> = network.curves.iter().map(|curve| &curve.shape).chain(&added).collect();
-            let filled = fill_told(&shapes, (&outlines, &told), options)?;
+            let filled = fill_told(&shapes, (&outlines, &origins), options)?;
             drop(shapes);
-            return Ok(FilledNetwork { loops: None, added, outlines, filled, bare });
+            let faces = origins.iter().map(|origin| origin.face).collect();
+            return Ok(FilledNetwork { loops: None, added, outlines, faces, filled, bare });
         }
     }
     let found = loops::find(network, how);
@@ -64,5 +67,5 @@ fn all(network: &Network, (from_faces, how): (bool, &loops::Options), options: &
     let outlines = nest::outlines(&shapes, &uses);
     let filled = fill(&shapes, &outlines, options)?;
     drop(shapes);
-    Ok(FilledNetwork { loops: Some(found), added: Vec::new(), outlines, filled, bare: Vec::new() })
+    Ok(FilledNetwork { loops: Some(found), added: Vec::new(), outlines, faces: Vec::new(), filled, bare: Vec::new() })
 }

@@ -5,6 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use rayon::prelude::*;
 
 use super::chords::{self, Chord};
+use super::faces::Origin;
 use super::layout::{Corner, Rim};
 use super::mesh::Mesh;
 use super::network::{self, Divided, Strands};
@@ -18,7 +19,6 @@ use super::strand::Strand;
 use super::tangent::{self, Beside};
 use super::tried::Tried;
 use crate::curves::curve::{Shape, Spline};
-use crate::curves::elementary::Told;
 use crate::curves::vector::Point;
 
 /// Edges of curves may be longer than those within by this factor.
@@ -98,25 +98,24 @@ pub fn fill_beside(
     options.with_threads(|| made(shapes, (outlines, &[]), beside, options))
 }
 
-/// As [`fill`], with the surfaces that a file says for its outlines, and the threads that there are.
-pub(super) fn fill_told(
-    shapes: &[&Shape],
-    outlines: (&[Outline], &[Option<Told>]),
-    options: &Options,
-) -> Result<Filled, FillError> {
+/// As [`fill`], with what a file says of its outlines, and the threads that there are.
+pub(super) fn fill_told(shapes: &[&Shape], outlines: (&[Outline], &[Origin]), options: &Options) -> Result<Filled, FillError> {
     made(shapes, outlines, &[], options)
 }
 
 /// Fills outlines with the threads that there are.
 fn made(
     shapes: &[&Shape],
-    (outlines, told): (&[Outline], &[Option<Told>]),
+    (outlines, origins): (&[Outline], &[Origin]),
     beside: &[Beside<'_>],
     options: &Options,
 ) -> Result<Filled, FillError> {
     let strands = strands(shapes, outlines)?;
     let tried: Vec<Tried> = (0..outlines.len())
-        .map(|number| Tried { told: told.get(number).copied().flatten().filter(|_| options.told), ..Tried::default() })
+        .map(|number| Tried {
+            told: origins.get(number).and_then(|origin| origin.told).filter(|_| options.told),
+            ..Tried::default()
+        })
         .collect();
     let mut divided = network::divide(&strands, outlines, options, &[]);
     if options.size.is_none() {
@@ -136,7 +135,7 @@ fn made(
     if options.continuity == Continuity::Tangent {
         tangent::bend(&tasks, &mut patches, beside);
     }
-    collected(divided.points, patches, (strands, outlines))
+    collected(divided.points, patches, (strands, outlines), origins)
 }
 
 /// Patches of outlines, whose curves are divided until triangles are even or for so many rounds. If some outlines were better before, all is done
@@ -261,6 +260,7 @@ fn collected(
     points: Vec<Point>,
     patches: Vec<Patch>,
     (strands, outlines): (Strands<'_>, &[Outline]),
+    origins: &[Origin],
 ) -> Result<Filled, FillError> {
     let mut filled = Filled { mesh: Mesh { points, ..Mesh::default() }, ..Filled::default() };
     for (number, patch) in patches.into_iter().enumerate() {
@@ -278,7 +278,7 @@ fn collected(
         filled.surfaces.push(patch.surface);
         filled.reports.push(patch.report);
     }
-    let flipped = flipped(&mut filled);
+    let flipped = flipped(&mut filled, origins);
     for (triangle, face) in filled.mesh.triangles.iter_mut().zip(&filled.mesh.face_of) {
         if flipped.get(*face as usize) == Some(&true) {
             triangle.swap(1, 2);
@@ -290,7 +290,7 @@ fn collected(
 }
 
 /// Which outlines to turn over; those without a surface count as if they had a lid.
-fn flipped(filled: &mut Filled) -> Vec<bool> {
+fn flipped(filled: &mut Filled, origins: &[Origin]) -> Vec<bool> {
     let Filled { surfaces, mesh, .. } = filled;
     let (points, triangles) = (mesh.points.len(), mesh.triangles.len());
     for (number, surface) in surfaces.iter().enumerate() {
@@ -303,7 +303,7 @@ fn flipped(filled: &mut Filled) -> Vec<bool> {
         }
         mesh.face_of.resize(mesh.triangles.len(), number as u32);
     }
-    let flipped = orient::flipped(mesh, surfaces.len());
+    let flipped = orient::flipped(mesh, surfaces.len(), |outline| origins.get(outline).is_some_and(|origin| origin.is_void));
     mesh.points.truncate(points);
     mesh.triangles.truncate(triangles);
     mesh.face_of.truncate(triangles);
@@ -355,7 +355,7 @@ mod tests {
             let surfaces = vec![plane.clone(), plane.clone(), plane.clone(), Surface::Fallback(vec![ring])];
             let mesh = Mesh { points: points.clone(), triangles, face_of: vec![0, 1, 2] };
             let mut filled = Filled { surfaces, mesh: mesh.clone(), ..Filled::default() };
-            assert_eq!(flipped(&mut filled), [is_inward, is_inward, is_inward, is_ring_turned]);
+            assert_eq!(flipped(&mut filled, &[]), [is_inward, is_inward, is_inward, is_ring_turned]);
             assert_eq!(filled.mesh, mesh);
         }
     }

@@ -14,12 +14,22 @@ use crate::curves::{Network, Use};
 const SAMPLES: u32 = 8;
 const NEAR: f64 = 1e-5;
 
+/// What a file says of an outline.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Origin {
+    /// Its face.
+    pub(super) face: usize,
+    pub(super) told: Option<Told>,
+    /// Whether it bounds a void.
+    pub(super) is_void: bool,
+}
+
 /// The faces of a file, to be filled.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Faces {
     pub(super) outlines: Vec<Outline>,
-    /// Of each outline, if the file says it.
-    pub(super) told: Vec<Option<Told>>,
+    /// Of each outline.
+    pub(super) origins: Vec<Origin>,
     /// Curves behind those of the network.
     pub(super) added: Vec<Shape>,
     /// Faces that no curve bounds, and that are no whole sphere or torus.
@@ -32,18 +42,20 @@ pub(super) fn outlines(network: &Network, how: &loops::Options, is_told: bool) -
     let mut all = Faces::default();
     for (number, face) in network.faces.iter().enumerate() {
         let told = face.told.filter(|_| is_told);
+        let origin = Origin { face: number, told, is_void: face.is_void };
         let is_bounded = |uses: &[Use]| !uses.is_empty() && !is_seam(uses);
         if is_bounded(&face.outer)
             || (face.inner.is_empty() && !face.outer.is_empty() && told.is_none_or(|told| !told.is_closed()))
         {
-            all.push(Outline::from(face), told);
+            all.push(Outline::from(face), origin);
             continue;
         }
-        // All that bounds it are holes: of a closed surface, any of them may come first.
+        // All that bounds it are holes: around a sphere or a torus, any of them may come first.
         let mut rings = face.inner.iter().filter(|uses| is_bounded(uses)).cloned();
-        match (told.filter(Told::is_closed), rings.next()) {
-            (Some(told), Some(outer)) => all.push(Outline { outer, inner: rings.collect() }, Some(told)),
-            (Some(told), None) => all.whole(told, network.curves.len()),
+        match (told, rings.next()) {
+            // A cone ends in its apex, and a disc may be told as a hole.
+            (_, Some(outer)) => all.push(Outline { outer, inner: rings.collect() }, origin),
+            (Some(told), None) if told.is_closed() => all.whole(told, origin, network.curves.len()),
             _ => all.bare.push(number),
         }
     }
@@ -59,14 +71,14 @@ pub(super) fn outlines(network: &Network, how: &loops::Options, is_told: bool) -
 }
 
 impl Faces {
-    fn push(&mut self, outline: Outline, told: Option<Told>) {
+    fn push(&mut self, outline: Outline, origin: Origin) {
         self.outlines.push(outline);
-        self.told.push(told);
+        self.origins.push(origin);
     }
 
     /// A whole sphere as two halves with a circle between them, a whole torus as two halves with two; `given` is the number of the network's curves.
-    fn whole(&mut self, told: Told, given: usize) {
-        let left = Some(Told { is_left: Some(true), ..told });
+    fn whole(&mut self, told: Told, origin: Origin, given: usize) {
+        let left = Origin { told: Some(Told { is_left: Some(true), ..told }), ..origin };
         let first = given + self.added.len();
         let use_of = |curve: usize, is_reversed: bool| vec![Use { curve, is_reversed }];
         match told.surface {

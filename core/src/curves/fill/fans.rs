@@ -42,15 +42,25 @@ pub(super) fn curve(strand: &Strand<'_>, one: &Use, options: &Options) -> Option
 }
 
 /// Parts of a ring: numbers of the first and the last point of each, where the last part ends with the first point. Each curve
-/// begins one, and any that is too wide is divided.
+/// begins one, and any that is too wide is divided; there are three at least, since two would share both their spokes, and could have the same edge between these.
 pub(super) fn parts(ring: &[Rim], centre: Point) -> Vec<[usize; 2]> {
+    let found = parted(ring, centre, WIDEST);
+    if found.len() > 2 {
+        return found;
+    }
+    let next = ring.iter().cycle().skip(1);
+    let all: f64 = ring.iter().zip(next).map(|(a, b)| angle(centre, a.point, b.point)).sum();
+    parted(ring, centre, all / 3.0)
+}
+
+fn parted(ring: &[Rim], centre: Point, widest: f64) -> Vec<[usize; 2]> {
     let mut parts = Vec::new();
     let (mut first, mut wide) = (0, 0.0);
     for (at, (rim, next)) in ring.iter().zip(ring.iter().cycle().skip(1)).enumerate() {
         wide += angle(centre, rim.point, next.point);
         let is_last = at + 1 == ring.len();
         let further = ring.get(at + 2).map_or(0.0, |further| angle(centre, next.point, further.point));
-        if is_last || next.part != rim.part || wide + further > WIDEST {
+        if is_last || next.part != rim.part || wide + further > widest {
             parts.push([first, at + 1]);
             (first, wide) = (at + 1, 0.0);
         }

@@ -27,6 +27,7 @@ mod lifted;
 mod linear;
 mod measure;
 mod mesh;
+mod middle;
 mod near;
 mod nest;
 mod network;

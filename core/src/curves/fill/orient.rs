@@ -7,8 +7,8 @@ use crate::curves::vector::{cross, dot, sub};
 type Link = (u32, u32, bool);
 
 /// For each outline, whether its triangles shall be reversed. Edges of more than two triangles tell nothing. Outlines that hang
-/// together and are closed face outwards; others go with the lowest of them. O(triangles · log).
-pub(super) fn flipped(mesh: &Mesh, outlines: usize) -> Vec<bool> {
+/// together and are closed face outwards, or inwards if the first of them bounds a void; others go with the lowest of them. O(triangles · log).
+pub(super) fn flipped(mesh: &Mesh, outlines: usize, is_void: impl Fn(usize) -> bool) -> Vec<bool> {
     let (links, open) = links(mesh);
     let mut neighbours: Vec<Vec<(u32, bool)>> = vec![Vec::new(); outlines];
     for &(a, b, is_same) in &links {
@@ -40,7 +40,7 @@ pub(super) fn flipped(mesh: &Mesh, outlines: usize) -> Vec<bool> {
     let volumes = volumes(mesh, &flips, &component);
     for (flip, number) in flips.iter_mut().zip(&component) {
         let at = *number as usize;
-        *flip ^= is_open.get(at) == Some(&false) && volumes.get(at).is_some_and(|volume| *volume < 0.0);
+        *flip ^= is_open.get(at) == Some(&false) && volumes.get(at).is_some_and(|volume| (*volume < 0.0) != is_void(at));
     }
     flips
 }

@@ -3,7 +3,6 @@
 use super::blend::{self, Curves};
 use super::carrier;
 use super::chords::{self, Chord};
-use super::fans;
 use super::fit::FitError;
 use super::improve::Improved;
 use super::layout::{Corner, Layout, Rim, Wish};
@@ -15,7 +14,6 @@ use super::report::{Method, Problem, Report, Surface};
 use super::side;
 use super::sides;
 use super::space;
-use super::star;
 use super::strand::{Kind, Strand};
 use super::triangles;
 use super::tried::Tried;
@@ -77,15 +75,15 @@ impl Patch {
 /// Points within, triangles, and the longest edge that the surface allows.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Meshed {
-    points: Vec<Point>,
-    triangles: Vec<[Corner; 3]>,
+    pub(super) points: Vec<Point>,
+    pub(super) triangles: Vec<[Corner; 3]>,
     pub(super) longest: f64,
     /// Triangles below 0.4: at corners of the outline below 15°, and elsewhere.
-    poor: [usize; 2],
+    pub(super) poor: [usize; 2],
     /// Where to divide edges of rings for the sake of those elsewhere.
-    wishes: Vec<Wish>,
+    pub(super) wishes: Vec<Wish>,
     /// Whether there are wishes for spokes.
-    is_cut: bool,
+    pub(super) is_cut: bool,
     /// Whether triangles beside each other face away from each other.
     pub(super) turns_back: bool,
 }
@@ -98,7 +96,7 @@ impl Meshed {
 }
 
 impl<'a> Task<'a> {
-    fn uses(&self) -> impl Iterator<Item = (&'a Strand<'a>, Use)> {
+    pub(super) fn uses(&self) -> impl Iterator<Item = (&'a Strand<'a>, Use)> {
         let strands = self.strands;
         let all = self.outline.rings().flatten();
         all.filter_map(move |one| strands.get(one.curve).and_then(Option::as_ref).map(|strand| (strand, *one)))
@@ -193,11 +191,17 @@ impl<'a> Task<'a> {
         if far > tolerance.max(carrier::NEAR * report.size) {
             return None;
         }
+        let is_told = |report: &mut Report| (report.is_told, report.is_left) = (true, told.is_left);
+        if let Some(found) = self.to_apex(&told, report) {
+            is_told(report);
+            return Some(found);
+        }
         let surface = side::facing(told, self.rings)?;
         let layout = unrolled::on_carrier(&surface, (self.rings, told.is_left), tolerance.max(far))?;
         let meshed = self.mesh(layout)?;
         report.method = if matches!(surface, Elementary::Plane(_)) { Method::Plane } else { Method::Recognised };
-        (report.error, report.is_told, report.is_left) = (far, true, told.is_left);
+        report.error = far;
+        is_told(report);
         report.is_ambiguous = told.is_ambiguous();
         Some((Surface::Carrier(surface), meshed))
     }
@@ -281,62 +285,6 @@ impl<'a> Task<'a> {
         Some((Surface::Heights(frame), meshed))
     }
 
-    fn centre(&self, curves: &Curves, report: &mut Report) -> Option<(Surface, Meshed)> {
-        let blend::Cone { layout, curve, ends, centre } = blend::centre(curves, self.rings.first()?).ok()?;
-        if blend::is_folded(&curve, centre) || !self.is_star(centre) {
-            return None;
-        }
-        let meshed = self.mesh(layout)?;
-        report.method = Method::Centre;
-        Some((Surface::Centre { curve: Box::new(curve), ends, centre }, meshed))
-    }
-
-    /// Whether no two edges of the outline cross as seen from a point.
-    fn is_star(&self, centre: Point) -> bool {
-        let ring: Vec<Point> = self.rings.iter().take(1).flatten().map(|rim| rim.point).collect();
-        star::is_star(&ring, centre)
-    }
-
-    /// A surface for each curve to a centre; spokes between them are divided until triangles are even or for so many rounds.
-    fn fans(&self, report: &mut Report) -> Option<(Surface, Meshed)> {
-        let ring = self.rings.first()?;
-        let parts: Vec<(&Strand<'_>, Use)> = self.uses().collect();
-        let centre = fans::centre(&parts);
-        if self.is_dry || !self.options.fans || !self.is_star(centre) {
-            return None;
-        }
-        let curves = parts.iter().map(|(strand, one)| fans::curve(strand, one, self.options)).collect::<Option<_>>()?;
-        let mut shares = fans::even(ring, centre, self.options.inner);
-        let mut meshed = self.fans_of(ring, centre, &mut shares)?;
-        for _ in 0..CUTS {
-            if meshed.poor[1] == 0 || !meshed.is_cut {
-                break;
-            }
-            meshed = self.fans_of(ring, centre, &mut shares)?;
-        }
-        report.method = Method::Fans;
-        Some((Surface::Fans { curves, centre }, meshed))
-    }
-
-    /// Triangles of all parts around a centre. Spokes are divided by shares of them, and these as parts wish it for the next time.
-    fn fans_of(&self, ring: &[Rim], centre: Point, shares: &mut [Vec<f64>]) -> Option<Meshed> {
-        let mut meshed = Meshed { longest: f64::INFINITY, ..Meshed::default() };
-        let own = shares.to_vec();
-        let mut whole = fans::Spokes::new(ring, centre, &own);
-        for part in fans::parts(ring, centre) {
-            let (layout, rims) = whole.laid(&part);
-            let alone = Task { rings: &[rims], ..*self };
-            let made = alone.mesh(layout)?;
-            meshed.poor = [0, 1].map(|kind| meshed.poor[kind] + made.poor[kind]);
-            meshed.is_cut |= whole.divide(&part, &made.wishes, shares);
-            meshed.wishes.extend(made.wishes);
-            whole.take(&part, (made.points, made.triangles));
-        }
-        (meshed.points, meshed.triangles) = (whole.points, whole.triangles);
-        fans::merge(shares);
-        Some(meshed)
-    }
-
     pub(super) fn mesh(&self, layout: Layout) -> Option<Meshed> {
         let longest = self.allowed(&layout);
         self.mesh_within(layout, longest, self.most())
@@ -410,7 +358,7 @@ impl<'a> Task<'a> {
     }
 
     /// Curves fitted, in the direction of the outer loop, and the largest error.
-    fn curves(&self, cosines: Vec<f64>) -> Result<(Curves, f64), FitError> {
+    pub(super) fn curves(&self, cosines: Vec<f64>) -> Result<(Curves, f64), FitError> {
         let mut parts = Vec::with_capacity(self.outline.outer.len());
         let mut largest = 0.0_f64;
         for one in &self.outline.outer {
@@ -424,7 +372,7 @@ impl<'a> Task<'a> {
     }
 
     /// Cosines between tangents where each curve of the outer loop begins.
-    fn cosines(&self) -> Vec<f64> {
+    pub(super) fn cosines(&self) -> Vec<f64> {
         let turned = |one: &Use| {
             let strand = self.strands.get(one.curve).and_then(Option::as_ref)?;
             let [start, end] = strand.tangents();

@@ -10,6 +10,9 @@ use crate::curves::vector::{Point, add, cross, distance, norm, scale, sub, unit}
 
 /// A sphere is not seen from points nearer to its outline than this, in radii, if there are others.
 const CLEAR: f64 = 0.2;
+/// Edges of an outline beside which such a point is looked for, at most, and how far from them, in radii.
+const SAMPLES: usize = 32;
+const STEPS: [f64; 5] = [0.02, 0.06, 0.15, 0.3, 0.6];
 
 /// The surface, of a sphere with its z-axis such that the part that is meant is seen from the opposite point. `None` if that cannot be told. O(points).
 pub(super) fn facing(told: Told, rings: &[Vec<Rim>]) -> Option<Elementary> {
@@ -26,7 +29,8 @@ pub(super) fn facing(told: Told, rings: &[Vec<Rim>]) -> Option<Elementary> {
     let sign = if is_left { 1.0 } else { -1.0 };
     let axes = [x, y, z].into_iter().flat_map(|axis| [axis, scale(axis, -1.0)]);
     let mut best: Option<(f64, Frame)> = None;
-    for z in normal.map(|normal| scale(normal, sign)).into_iter().chain(axes) {
+    let beside = holes(frame.origin, radius, &ring, is_left);
+    for z in normal.map(|normal| scale(normal, sign)).into_iter().chain(axes).chain(beside) {
         let frame = Frame::around(frame.origin, z);
         let chart = Chart::Sphere(frame, radius);
         let places: Vec<(Corner, [f64; 2])> = ring.iter().map(|rim| (Corner::Rim(rim.vertex), chart.flat(rim.point))).collect();
@@ -40,6 +44,20 @@ pub(super) fn facing(told: Told, rings: &[Vec<Rim>]) -> Option<Elementary> {
         }
     }
     best.map(|(_, frame)| Elementary::Sphere { frame, radius })
+}
+
+/// Directions whose opposite points are on the other side of a ring: near to it, and so within holes of any size.
+fn holes(centre: Point, radius: f64, ring: &[Rim], is_left: bool) -> Vec<Point> {
+    let sign = if is_left { 1.0 } else { -1.0 };
+    let pairs: Vec<(&Rim, &Rim)> = ring.iter().zip(ring.iter().cycle().skip(1)).collect();
+    let mut found = Vec::new();
+    for (a, b) in pairs.iter().step_by(pairs.len().div_ceil(SAMPLES).max(1)) {
+        let out = sub(scale(add(a.point, b.point), 0.5), centre);
+        let Some(right) = unit(cross(sub(b.point, a.point), out)) else { continue };
+        let places = STEPS.map(|step| unit(add(out, scale(right, step * sign * radius))));
+        found.extend(places.into_iter().flatten().map(|place| scale(place, -1.0)));
+    }
+    found
 }
 
 /// Twice the area vector of a ring.

@@ -44,6 +44,7 @@ fn face(rings: &[&[i32]], told: Option<(Elementary, bool)>) -> Face {
         outer: rings.next().unwrap_or_default(),
         inner: rings.collect(),
         is_untrimmed: false,
+        is_void: false,
     }
 }
 
@@ -132,6 +133,26 @@ fn a_sphere_is_on_the_side_that_is_told() {
     }
 }
 
+/// A ball with two bores across it, whose outline a seam makes one: it is seen from within one of them.
+#[test]
+fn a_sphere_with_holes_on_both_sides_is_seen_from_one_of_them() {
+    let ring = |z: f64| {
+        let axes = [0, 1].map(|axis| FRAME.axes[axis].map(|x| 0.3 * x));
+        Shape::Arc(Arc::new(FRAME.outside([0.0, 0.0, z]), axes, [0.0, 0.0]).unwrap())
+    };
+    let high = (4.0_f64 - 0.09).sqrt();
+    let angle = (0.3 / 2.0_f64).asin();
+    let axes = [2, 0].map(|axis| FRAME.axes[axis].map(|x| 2.0 * x));
+    let seam = Shape::Arc(Arc::new(FRAME.origin, axes, [angle, PI - angle]).unwrap());
+    // Upper ring the one way, down the seam, lower ring the other way, and up: the bores are to the right of their rings, seen from outside.
+    let shapes = vec![ring(high), ring(-high), seam];
+    let faces = vec![face(&[&[-1, 3, 2, -3]], Some((BALL, true))), face(&[&[1]], None), face(&[&[2]], None)];
+    let result = filled(shapes, faces);
+    assert!(result.filled.reports[0].is_told, "{:?}", result.filled.reports);
+    let cap = PI * (2.0 - high).powi(2) * (6.0 - (2.0 - high)) / 3.0;
+    check(&result, 4.0 / 3.0 * PI * 8.0 - 2.0 * cap, "ball without its poles");
+}
+
 /// A circle bounds a disc, and half of a sphere: the file says which.
 #[test]
 fn a_circle_bounds_what_is_told() {
@@ -167,6 +188,39 @@ fn a_torus_is_on_the_side_that_is_told() {
             .fold(0.0, |most: f64, z| if z.abs() > most.abs() { z } else { most });
         assert_eq!(high > 0.0, is_left);
     }
+}
+
+/// A cone with its apex within a circle, or within four arcs: the circle bounds a disc, too. Files say that a cone has an apex in many ways; some tell of its
+/// circle as of a hole.
+#[test]
+fn a_cone_ends_in_its_apex() {
+    let (frame, parts) = (Frame { origin: FRAME.outside([0.0, 0.0, -3.0]), ..FRAME }, 4);
+    let cone = Elementary::Cone { frame, slope: 2.0 / 3.0 };
+    let arc = |k: i32| {
+        let axes = [0, 1].map(|axis| FRAME.axes[axis].map(|x| 2.0 * x));
+        Shape::Arc(Arc::new(FRAME.origin, axes, [f64::from(k), f64::from(k + 1)].map(|k| k * FRAC_PI_2)).unwrap())
+    };
+    let mut hole = face(&[&[], &[-1]], Some((cone, true)));
+    hole.is_untrimmed = false;
+    let one = (vec![circle(2.0)], vec![face(&[&[1]], None), hole]);
+    let ring: &[i32] = &[1, 2, 3, 4];
+    let four = ((0..parts).map(arc).collect(), vec![face(&[ring], None), face(&[ring], Some((cone, false)))]);
+    for (shapes, faces) in [one, four] {
+        let result = filled(shapes, faces);
+        assert!(is_closed(&result.filled.mesh), "{:?}", result.filled.reports);
+        assert!((volume(&result.filled.mesh) / (4.0 * PI) - 1.0).abs() < 4e-3, "{}", volume(&result.filled.mesh));
+        assert!(result.filled.mesh.points.iter().any(|point| distance(*point, frame.origin) < 1e-12));
+        assert_eq!(result.filled.reports[1].method, Method::Fans);
+    }
+}
+
+/// A void of a solid faces inwards: its volume counts less.
+#[test]
+fn voids_face_inwards() {
+    let large = Elementary::Sphere { frame: FRAME, radius: 3.0 };
+    let void = Face { is_void: true, ..face(&[], Some((BALL, true))) };
+    let result = filled(Vec::new(), vec![face(&[], Some((large, true))), void]);
+    check(&result, 4.0 / 3.0 * PI * 19.0, "hollow ball");
 }
 
 /// Nothing bounds a whole sphere or a whole torus; seams that are passed there and back do not either.

@@ -53,6 +53,12 @@ fn on_turned(turned: Turned, (rings, is_left): (&[Vec<Rim>], Option<bool>), tole
     Some(oriented(Chart::Turned(turned), places, added))
 }
 
+/// Whether a ring runs around the axis, so that it has no flat place alone.
+pub(super) fn is_around(turned: &Turned, ring: &[Rim], tolerance: f64) -> bool {
+    let (_, shift) = lift(turned, ring, tolerance);
+    shift[0].abs() > 1.0
+}
+
 /// A cone with its x-axis turned by an angle.
 fn centred(turned: Turned, angle: f64) -> Turned {
     let Turned::Cone(mut frame, half) = turned else { return turned };

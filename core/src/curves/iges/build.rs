@@ -43,6 +43,8 @@ pub(super) struct Builder<'a> {
     room: usize,
     instances: u32,
     digits: u32,
+    /// Whether it reads a shell around a void now.
+    pub(super) is_void: bool,
 }
 
 impl<'a> Builder<'a> {
@@ -63,6 +65,7 @@ impl<'a> Builder<'a> {
             room: 16 * bytes + (1 << 20),
             instances: 0,
             digits: 0,
+            is_void: false,
         }
     }
 
@@ -155,6 +158,7 @@ impl<'a> Builder<'a> {
                     outer: Vec::new(),
                     inner: Vec::new(),
                     is_untrimmed: true,
+                    is_void: false,
                 });
             }
             let is_read =

@@ -31,12 +31,16 @@ impl Builder<'_> {
             Ok(count) => numbers.extend((0..count).filter_map(|number| parameters.pointer(from + 2 * number).ok())),
             Err(why) => self.damaged(entry, &why),
         }
-        for number in numbers {
+        let around = self.is_void;
+        for (at, number) in numbers.into_iter().enumerate() {
+            // The first shell of a solid is the outer one.
+            self.is_void = around || (entry.kind == 186 && at > 0);
             match self.directory.get(number) {
                 Some(part) => self.thing(part, place, depth + 1),
                 None => self.lost(entry, number),
             }
         }
+        self.is_void = around;
     }
 
     /// A surface with its boundaries.
@@ -49,6 +53,7 @@ impl Builder<'_> {
         self.done.insert(entry.number);
         let place = self.placed(entry, around);
         let mut loops: Vec<Vec<Use>> = Vec::with_capacity(outline.loops.len());
+        let bound_by = outline.loops.first().copied();
         for number in outline.loops {
             let Some(bound) = self.directory.get(number).copied() else {
                 self.lost(entry, number);
@@ -70,10 +75,19 @@ impl Builder<'_> {
         }
         let outer = if outline.has_outer && !loops.is_empty() { loops.remove(0) } else { Vec::new() };
         let surface = self.directory.get(outline.surface).map(|surface| surface.kind.to_string()).unwrap_or_default();
-        let told = self.told(outline.surface, place);
+        let told = self.told(outline.surface, (entry, bound_by), place);
         let source = Source { id: Id::Directory(entry.number.into()), line: entry.line };
         let is_untrimmed = !outline.has_outer;
-        self.faces.push(Face { source, entity: entry.kind.to_string(), surface, told, outer, inner: loops, is_untrimmed });
+        self.faces.push(Face {
+            source,
+            entity: entry.kind.to_string(),
+            surface,
+            told,
+            outer,
+            inner: loops,
+            is_untrimmed,
+            is_void: self.is_void,
+        });
     }
 
     /// 142: the curve in space, if there is one.

@@ -22,6 +22,7 @@ mod shapes;
 mod surfaces;
 #[cfg(test)]
 mod tests;
+mod told;
 
 use crate::curves::collect::Collector;
 use crate::curves::network::{Network, ReadError};

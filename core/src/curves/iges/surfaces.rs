@@ -6,16 +6,22 @@ use super::parameters::Parameters;
 use super::places::Place;
 use crate::curves::carrier::{Carrier, Tensor};
 use crate::curves::curve::{Curve, Id, Role, Shape, Source};
-use crate::curves::elementary::Told;
 use crate::curves::network::Use;
 use crate::curves::vector::{Affine, Point, cross, sub, unit};
 
 /// A surface, and the map from parameters as IGES counts them to those of the carrier.
-struct Carried {
-    carrier: Carrier,
+pub(super) struct Carried {
+    pub(super) carrier: Carrier,
     parameters: Affine,
     /// Where the surface's own matrix puts it.
-    map: Affine,
+    pub(super) map: Affine,
+}
+
+impl Carried {
+    /// The map from parameters as the file counts them to those of the carrier.
+    pub(super) fn parameters(&self) -> &Affine {
+        &self.parameters
+    }
 }
 
 /// Curves of a boundary; how far off they are and may be, if they are fitted.
@@ -82,19 +88,7 @@ impl Builder<'_> {
         (2..2 + count).filter_map(|at| parameters.pointer(at).ok()).for_each(|part| self.mark(part, depth + 1));
     }
 
-    /// The surface of a face, if it is one of revolution (120) that has an equation. On which side of their boundary faces are, IGES says for those of solids
-    /// alone, and programs do not keep to it.
-    pub(super) fn told(&mut self, number: u32, place: Place) -> Option<Told> {
-        if self.directory.get(number)?.kind != 120 {
-            return None;
-        }
-        let carried = self.carried(number).ok()?;
-        let map = self.places.map(place).after(&carried.map);
-        let told = carried.carrier.told(true)?.transformed(&map)?;
-        Some(Told { is_left: None, ..told })
-    }
-
-    fn carried(&mut self, number: u32) -> Result<Carried, String> {
+    pub(super) fn carried(&mut self, number: u32) -> Result<Carried, String> {
         let entry = *self.directory.get(number).ok_or_else(|| format!("D{number} is not in the file"))?;
         let parameters = self.parameters(&entry).ok_or_else(|| format!("D{number} is damaged"))?;
         let map = if entry.matrix == 0 { Affine::IDENTITY } else { self.places.matrix(self.directory, entry.matrix)? };
@@ -103,6 +97,7 @@ impl Builder<'_> {
             (120, _) => self.turned(&parameters)?,
             (122, _) => self.drawn(&parameters)?,
             (128, _) => (tensor(&parameters)?, Affine::IDENTITY),
+            (190..=198, _) => (self.equation(entry.kind, &parameters)?, Affine::IDENTITY),
             (kind, _) => return Err(format!("its surface is of type {kind}")),
         };
         Ok(Carried { carrier, parameters: own, map })

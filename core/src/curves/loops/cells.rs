@@ -8,7 +8,7 @@
 //! faces of many sides are found, too.
 //!
 //! The last cycle of a part that it closes is a face only if it does not go around all others: if it is no longer than the longest of them, or
-//! its area is less than half of theirs, or less than 9/10 where it has no more sides than they. So the outline of a flat network is no face, and the bottom of
+//! its area is less than half of theirs, or less than 9/10 where it has no more sides than they, or is flat. So the outline of a flat network is no face, and the bottom of
 //! a box, or of a tetrahedron, is one.
 
 use std::cmp::Reverse;
@@ -19,13 +19,15 @@ use super::graph::{Star, append, contracted, in_cycles};
 use super::rotation;
 use crate::curves::curve::Shape;
 use crate::curves::network::Use;
-use crate::curves::vector::{Point, add, cross, norm, scale, sub, unit};
+use crate::curves::vector::{Point, add, cross, dot, norm, scale, sub, unit};
 
 /// Edges that a search looks at, and cycles that it gives, at most.
 const MOST_STEPS: usize = 192;
 const MOST_CYCLES: usize = 3;
 /// Rounds, at most.
 const ROUNDS: u32 = 32;
+/// How far points of a flat cycle may be from its plane, in sizes.
+const FLAT: f64 = 1e-5;
 /// Neighbours of an edge around a node where their order is not heeded.
 const MOST_NEIGHBOURS: usize = 16;
 
@@ -229,7 +231,7 @@ impl Cells<'_, '_> {
         });
         let open = open + cycle.key.len() as i64 - 2 * shared;
         let own = cycle.key.len();
-        let share = if own <= sides { 0.9 } else { 0.5 };
+        let share = if own <= sides || self.is_flat(&cycle.uses) { 0.9 } else { 0.5 };
         let is_face = open > 0 || cycle.length <= longest * (1.0 + 1e-9) || area < share * sum;
         if !is_face {
             return;
@@ -261,8 +263,24 @@ impl Cells<'_, '_> {
         of
     }
 
-    /// The vector area of a cycle, of 8 points on each curve.
+    /// The vector area of a cycle.
     fn area(&self, uses: &[Use]) -> Point {
+        let points = self.points(uses);
+        let first = points.first().copied().unwrap_or_default();
+        let triangle = |pair: &[Point]| if let &[a, b] = pair { cross(sub(a, first), sub(b, first)) } else { [0.0; 3] };
+        scale(points.windows(2).map(triangle).fold([0.0; 3], add), 0.5)
+    }
+
+    /// Whether a cycle is in a plane.
+    fn is_flat(&self, uses: &[Use]) -> bool {
+        let (points, normal) = (self.points(uses), unit(self.area(uses)).unwrap_or_default());
+        let first = points.first().copied().unwrap_or_default();
+        let size = points.iter().fold(0.0_f64, |most, point| most.max(norm(sub(*point, first))));
+        points.iter().all(|point| dot(sub(*point, first), normal).abs() <= FLAT * size)
+    }
+
+    /// Points of a cycle: 8 on each curve, one on a line.
+    fn points(&self, uses: &[Use]) -> Vec<Point> {
         let mut points: Vec<Point> = Vec::new();
         for one in uses {
             let Some(chain) = self.chains.get(one.curve) else { continue };
@@ -281,9 +299,7 @@ impl Cells<'_, '_> {
                 }));
             }
         }
-        let first = points.first().copied().unwrap_or_default();
-        let triangle = |pair: &[Point]| if let &[a, b] = pair { cross(sub(a, first), sub(b, first)) } else { [0.0; 3] };
-        scale(points.windows(2).map(triangle).fold([0.0; 3], add), 0.5)
+        points
     }
 
     /// Turns faces round so that two that share an edge follow it in opposite directions, as far as that is possible.

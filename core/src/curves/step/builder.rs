@@ -51,6 +51,8 @@ pub(super) struct Builder<'a> {
     pub(super) uncertainty: f64,
     /// Whether it reads a curve of two dimensions now.
     pub(super) is_flat: bool,
+    /// Whether it reads a shell around a void now.
+    pub(super) is_void: bool,
     /// What curves are for that it reads now.
     pub(super) role: Role,
     pub(super) shape_items: Option<HashSet<u64>>,
@@ -81,6 +83,7 @@ impl<'a> Builder<'a> {
             angle: 1.0,
             uncertainty: 0.0,
             is_flat: false,
+            is_void: false,
             role: Role::Free,
             shape_items: None,
             aspects: HashSet::new(),

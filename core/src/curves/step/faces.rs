@@ -54,7 +54,16 @@ impl Builder<'_> {
         let is_untrimmed = outer.is_empty() && loops.is_empty();
         let inner = loops.into_iter().map(|(_, uses)| uses).collect();
         let source = Source { id: Id::Instance(id), line: self.line(id) };
-        self.faces.push(Face { source, entity: record.name.to_string(), surface, told, outer, inner, is_untrimmed });
+        self.faces.push(Face {
+            source,
+            entity: record.name.to_string(),
+            surface,
+            told,
+            outer,
+            inner,
+            is_untrimmed,
+            is_void: self.is_void,
+        });
     }
 
     /// EDGE_LOOP: edges in their order. POLY_LOOP: straight ones from point to point. VERTEX_LOOP: none.
@@ -133,7 +142,7 @@ impl Builder<'_> {
         let told = self.told(id_of_surface, &surface, true, place).map(|told| Told { is_left: None, ..told });
         let source = Source { id: Id::Instance(id), line: self.line(id) };
         let (entity, outer) = ("CURVE_BOUNDED_SURFACE".to_owned(), outer.unwrap_or_default());
-        self.faces.push(Face { source, entity, surface, told, outer, inner: loops, is_untrimmed });
+        self.faces.push(Face { source, entity, surface, told, outer, inner: loops, is_untrimmed, is_void: self.is_void });
     }
 
     /// The surface of a face where that is placed, if it has an equation.

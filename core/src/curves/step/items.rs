@@ -63,13 +63,16 @@ impl Builder<'_> {
             return;
         }
         self.done.insert(id);
+        let around = self.is_void;
         for at in places {
+            self.is_void = around || (*at == 2 && record.name.is("BREP_WITH_VOIDS"));
             let found = record.references(*at).or_else(|_| record.reference(*at).map(|part| vec![part]));
             match found {
                 Ok(found) => found.into_iter().for_each(|part| self.item(part, place, depth + 1)),
                 Err(why) => self.note(id, "damaged and not read", &why),
             }
         }
+        self.is_void = around;
     }
 
     /// MAPPED_ITEM: all of another representation, its origin put somewhere else.

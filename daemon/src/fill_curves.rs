@@ -242,6 +242,19 @@ fn as_text(args: &FillCurvesArgs, done: &Done) -> String {
             lines.push(format!("  lost    {} too small for single precision", words::triangles(mesh.too_small)));
         }
     }
+    lines.extend(doubts(network, filled));
+    lines.extend(left_over(done));
+    if let Some(mesh) = mesh {
+        let verdict = &mesh.report.verdict;
+        lines.push(format!("  verdict {}: {}", if verdict.good { "good" } else { "not good" }, verdict.statement));
+        lines.extend(verdict.reasons.iter().take(LISTED).map(|reason| format!("          {reason}")));
+    }
+    lines.iter().map(|line| plain(line) + "\n").collect()
+}
+
+/// Surfaces of the file that are not used, and outlines that another surface may have.
+fn doubts(network: &Network, filled: &FilledNetwork) -> Vec<String> {
+    let mut lines = Vec::new();
     let mut unused: BTreeMap<&str, u64> = BTreeMap::new();
     for (number, report) in filled.faces.iter().zip(&filled.filled.reports).filter(|(_, report)| !report.is_told) {
         let surface = network.faces.get(*number).map_or("", |face| face.surface.as_str());
@@ -261,16 +274,10 @@ fn as_text(args: &FillCurvesArgs, done: &Done) -> String {
             "  unsure  {of}: another simple surface has the same curves, as a disc and half of a sphere have one circle"
         ));
     }
-    lines.extend(left_over(done));
-    if let Some(mesh) = mesh {
-        let verdict = &mesh.report.verdict;
-        lines.push(format!("  verdict {}: {}", if verdict.good { "good" } else { "not good" }, verdict.statement));
-        lines.extend(verdict.reasons.iter().take(LISTED).map(|reason| format!("          {reason}")));
-    }
-    lines.iter().map(|line| plain(line) + "\n").collect()
+    lines
 }
 
-/// What is left of the outlines and faces.
+/// Outlines and faces that are left.
 fn left_over(done: &Done) -> Vec<String> {
     let Done { network, filled, left, .. } = done;
     let mut lines = Vec::new();

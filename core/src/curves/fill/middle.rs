@@ -18,7 +18,7 @@ const CUTS: u32 = 12;
 
 impl Task<'_> {
     /// A cone that the file says, whose apex is within its only ring: straight to that from the curves.
-    pub(super) fn to_apex(&self, told: &Told, report: &mut Report) -> Option<(Surface, Meshed)> {
+    pub(super) fn around_apex(&self, told: &Told, report: &mut Report) -> Option<(Surface, Meshed)> {
         let Elementary::Cone { frame, .. } = told.surface else { return None };
         let [ring] = self.rings else { return None };
         let Chart::Turned(cone) = Chart::of(&told.surface) else { return None };
@@ -28,7 +28,7 @@ impl Task<'_> {
         // Edges half as long as those of the ring are no farther from the cone where that is a quarter as wide.
         let next = ring.iter().cycle().skip(1);
         let longest = ring.iter().zip(next).map(|(a, b)| distance(a.point, b.point)).fold(0.0, f64::max);
-        self.to_centre((frame.origin, 0.5 * longest), report)
+        self.around_centre((frame.origin, 0.5 * longest), report)
     }
 
     /// A cone over all curves to their middle.
@@ -51,11 +51,11 @@ impl Task<'_> {
     /// A surface for each curve to their middle.
     pub(super) fn fans(&self, report: &mut Report) -> Option<(Surface, Meshed)> {
         let centre = fans::centre(&self.uses().collect::<Vec<_>>());
-        if self.options.fans { self.to_centre((centre, f64::INFINITY), report) } else { None }
+        if self.options.fans { self.around_centre((centre, f64::INFINITY), report) } else { None }
     }
 
     /// A surface for each curve to a centre, with edges no longer than so; spokes between them are divided until triangles are even or for so many rounds.
-    fn to_centre(&self, (centre, longest): (Point, f64), report: &mut Report) -> Option<(Surface, Meshed)> {
+    fn around_centre(&self, (centre, longest): (Point, f64), report: &mut Report) -> Option<(Surface, Meshed)> {
         let ring = self.rings.first()?;
         let parts: Vec<(&Strand<'_>, Use)> = self.uses().collect();
         if self.is_dry || !self.is_star(centre) {

@@ -192,7 +192,7 @@ impl<'a> Task<'a> {
             return None;
         }
         let is_told = |report: &mut Report| (report.is_told, report.is_left) = (true, told.is_left);
-        if let Some(found) = self.to_apex(&told, report) {
+        if let Some(found) = self.around_apex(&told, report) {
             is_told(report);
             return Some(found);
         }

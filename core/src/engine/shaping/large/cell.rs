@@ -1,7 +1,7 @@
 //! The triangles of one cell, and all that reach into it, as a mesh that is simplified by itself.
 //!
-//! A cell is a half-open box. Triangles with all corners in it are its own, and stay within it, so that those of different cells have nothing in common: not
-//! even a point. All others stay as they are; own ones do not cross them.
+//! A cell is a half-open box. Triangles with all corners in it are its own, and stay within it, so that those of different cells have nothing in
+//! common: not even a point. All others stay as they are; own ones do not cross them.
 
 use crate::engine::mesh::Mesh;
 use crate::io::record::Record;

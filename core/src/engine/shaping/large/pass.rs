@@ -189,8 +189,8 @@ impl Pass<'_> {
     }
 }
 
-/// How many triangles are to be left of each cell's `own`, if so many of all are wanted: their share, or in the last pass so many fewer as seams have beyond theirs, but
-/// no less than half of it.
+/// How many triangles are to be left of each cell's `own`, if so many of all are wanted: their share, or in the last pass so many fewer as seams have
+/// beyond theirs, but no less than half of it.
 fn shares(own: &[usize], all: usize, (wanted, is_last): (usize, bool)) -> Vec<usize> {
     let sum: usize = own.iter().sum();
     let share = (sum as u128 * wanted as u128 / all.max(1) as u128) as usize;

@@ -10,7 +10,7 @@ use crate::geometry::tri_tri::Triangle;
 use crate::stream::plan::Plan;
 
 /// Cells in both passes, or in the first one.
-const SIZES: [Sizes; 2] = [Sizes { cell: 500, whole: 300 }, Sizes { cell: 500, whole: 2500 }];
+const SIZES: [Sizes; 2] = [Sizes { cell: 500, whole: 300 }, Sizes { cell: 500, whole: 4500 }];
 
 /// A torus of n × n squares with bumps.
 fn torus(n: u32) -> Vec<Record> {
@@ -76,8 +76,8 @@ fn cells_leave_a_closed_surface_that_does_not_cross_itself_within_the_bound_that
     let records = torus(50);
     let before = triangles(&records);
     let profiles = [
-        Profile { simplify_ratio: 0.2, ..Profile::default() },
-        Profile { simplify_triangles: 1500, ..Profile::default() },
+        Profile { simplify_ratio: 0.4, ..Profile::default() },
+        Profile { simplify_triangles: 1800, ..Profile::default() },
         Profile { simplify_within_mm: 0.05, ..Profile::default() },
     ];
     for (profile, sizes) in profiles.iter().flat_map(|profile| SIZES.iter().map(move |sizes| (profile, sizes))) {

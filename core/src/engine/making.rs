@@ -58,25 +58,27 @@ pub(crate) fn make(mesh: MeshFile, output: &Path, is_of_target: bool, work: Work
 }
 
 /// Writes the changed mesh, if it changes and is no worse then; completes the report and the edit.
-fn changed(mesh: &MeshFile, (step, change): (&Step, Change), made: &mut Made, work: Work<'_>) -> Result<Option<Nameless>> {
+fn changed(mesh: &MeshFile, (step, mut change): (&Step, Change), made: &mut Made, work: Work<'_>) -> Result<Option<Nameless>> {
     let Work { profile, limits, progress } = work;
     if change.is_none() {
         change.told.put(&mut made.report);
         return Ok(None);
     }
-    let added = change.records();
-    let own = Edit::default().then(mesh.records(), &change.gone, added.clone(), step.repair());
+    // They may be many: there is one copy of them.
+    let own = Edit::default().then(mesh.records(), &change.gone, std::mem::take(&mut change.added), step.repair());
     let spool = Nameless::new(limits)?;
     let path = spool.path();
     emit::draft(mesh, &path, limits, progress, |draft| draft.finish(&Content::Edited(&own)))?.0.durable()?;
     let written = files::open(&path, limits, progress)?.called(mesh.path());
+    change.added = own.into_added();
     let judged = files::look(&written, (profile, limits), progress, &mut Clock::start())?;
     if !shaping::is_no_worse(&made.report, &judged) {
         change.told.left(&judged).put(&mut made.report);
         return Ok(None);
     }
     let edit = std::mem::take(&mut made.edit);
-    made.edit = edit.then(made.mesh.records(), &change.gone, added, step.repair());
-    shaping::tell(&mut made.report, (step, change), judged, Some((&made.edit, made.mesh.records().len())));
+    let counts = [change.count_gone(), change.added.len() as u64];
+    made.edit = edit.then(made.mesh.records(), &change.gone, change.added, step.repair());
+    shaping::tell(&mut made.report, (step, change.told, counts), judged, Some((&made.edit, made.mesh.records().len())));
     Ok(Some(spool))
 }

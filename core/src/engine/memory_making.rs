@@ -8,7 +8,9 @@ use crate::engine::memory::{self, Held, RepairedMesh};
 use crate::engine::mesh::{Mesh, MeshView};
 use crate::engine::shaping::{self, Change, Origins, Step};
 use crate::engine::work::Work;
+use crate::io::record;
 use crate::repairs::Steps;
+use crate::util::bits;
 
 /// Repairs a mesh, and shapes it.
 ///
@@ -40,10 +42,11 @@ fn changed(
     (step, change): (&Step, Change),
     Work { profile, limits, progress }: Work<'_>,
 ) -> Result<()> {
-    let is_gone = |k: &usize| change.gone.binary_search(&(*k as u32)).is_ok();
+    let is_gone = |k: &usize| bits::holds(&change.gone, *k);
     let stay: Vec<usize> = (0..repaired.origins.len()).filter(|k| !is_gone(k)).collect();
     let corners: Vec<[[f32; 3]; 3]> = repaired.mesh.view().triangles().collect();
-    let triangles: Vec<[[f32; 3]; 3]> = stay.iter().filter_map(|k| corners.get(*k)).chain(&change.added).copied().collect();
+    let added = change.added.iter().map(record::corners);
+    let triangles: Vec<[[f32; 3]; 3]> = stay.iter().filter_map(|k| corners.get(*k)).copied().chain(added).collect();
     let mesh = Mesh::from_triangles(&triangles);
     let (false, Ok(mesh)) = (change.is_none(), mesh) else {
         change.told.put(&mut repaired.report);
@@ -58,7 +61,8 @@ fn changed(
     let added = change.added.iter().map(|_| FaceOrigin::Repair(step.repair()));
     (repaired.origins, repaired.mesh) = (origins.chain(added).collect(), mesh);
     let facts = judged.input.clone();
-    shaping::tell(&mut repaired.report, (step, change), judged, None);
+    let counts = [change.count_gone(), change.added.len() as u64];
+    shaping::tell(&mut repaired.report, (step, change.told, counts), judged, None);
     count(repaired);
     repaired.report.output = Some(facts);
     Ok(())

@@ -11,7 +11,7 @@ use crate::output::attribute_words;
 use crate::submesh::components::Reversed;
 use crate::submesh::{Origin, Submesh};
 use crate::topology::survey::Survey;
-use crate::util::bits::{self, Shared};
+use crate::util::bits::{self, Shared, next_one, ones};
 
 /// The change of an input record that is not untouched.
 #[derive(Clone, Debug, PartialEq)]
@@ -374,27 +374,6 @@ pub(crate) fn records_of(survey: &Survey<'_>, wanted: impl Fn(u32) -> bool + Syn
         },
     );
     (records.into_bits(), counts.into_iter().sum())
-}
-
-/// The first bit that is set from `at` on, or past the end.
-fn next_one(bits: &[u64], at: usize) -> usize {
-    let mut word = at / 64;
-    let mut mask = !0u64 << (at % 64);
-    while word < bits.len() {
-        let found = bits[word] & mask;
-        if found != 0 {
-            return word * 64 + found.trailing_zeros() as usize;
-        }
-        word += 1;
-        mask = !0;
-    }
-    usize::MAX
-}
-
-/// All bits that are set.
-fn ones(bits: &[u64]) -> impl Iterator<Item = u32> + '_ {
-    let next = |at: usize| Some(next_one(bits, at)).filter(|one| *one != usize::MAX);
-    std::iter::successors(next(0), move |one| next(one + 1)).map(|one| one as u32)
 }
 
 /// Adds the next number to inclusive ranges.

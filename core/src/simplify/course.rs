@@ -9,7 +9,7 @@ use crate::simplify::held::Held;
 use crate::simplify::legal;
 use crate::simplify::net::{Constraints, Net};
 use crate::simplify::parting::Parting;
-use crate::simplify::partition::Parting as Planes;
+use crate::simplify::partition::{EVERYWHERE, Parting as Planes};
 use crate::simplify::rounds::{self, Goal};
 use crate::simplify::task::{Ended, Input, Options, Outcome};
 use crate::util::ids::NONE;
@@ -88,7 +88,8 @@ impl Course<'_> {
             let before = net.faces.len();
             let is_whole = net.points.len() <= self.cell;
             let goal = Goal { triangles: wanted, margin };
-            let round = rounds::round(&mut net, rules, Planes { most: self.cell, below }, goal);
+            let within = self.input.within.unwrap_or(EVERYWHERE);
+            let round = rounds::round(&mut net, rules, Planes { most: self.cell, below, within }, goal);
             became.par_iter_mut().for_each(|v| *v = round.became[*v as usize]);
             redone += round.redone;
             is_limited = round.is_limited;

@@ -38,7 +38,7 @@ const CELL: usize = 12_000;
 
 /// The largest deviation where a count is wanted and no deviation is given, as a share of the diagonal of the box around all points: a count that is out
 /// of reach is not paid for by the shape.
-const MOST_DEVIATION: f64 = 0.01;
+pub(crate) const MOST_DEVIATION: f64 = 0.01;
 
 /// Times that places which miss the deviation are done again, at most.
 const ATTEMPTS: usize = 16;
@@ -79,7 +79,7 @@ fn in_cells(input: &Input<'_>, options: &Options, cell: usize) -> Result<Outcome
     if !options.prove && options.max_deviation.is_none() {
         return Ok(measured(made.outcome(input), input, &bounds));
     }
-    let is_tight = options.max_deviation.is_none();
+    let is_tight = options.tight || options.max_deviation.is_none();
     let mut verdict = proof::prove(&made.pairing(input), most, is_tight);
     let mut first = None;
     while verdict.proved.forward.max(verdict.proved.backward) > most {

@@ -242,7 +242,7 @@ mod tests {
             origins,
             open: first.open.clone(),
         };
-        let input = Input { points: &points, faces: &faces, region: None, fixed: None };
+        let input = Input { points: &points, faces: &faces, region: None, fixed: None, within: None };
         let is_parted = (0..net.points.len()).map(|w| w == sunk(15) as usize).collect();
         let parting = Parting { input: &input, first: &first, net: &net, became: &became, is_parted };
         let (parted, became) = parting.net(&none, &[0; 36], true);

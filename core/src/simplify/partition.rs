@@ -50,13 +50,19 @@ pub(super) struct Parting {
     pub(super) most: usize,
     /// The share of vertices below each plane.
     pub(super) below: f64,
+    /// The box that is parted: from the first corner, and before the second one. Vertices may lie outside, and stay then.
+    pub(super) within: [Point; 2],
 }
+
+/// The box around all of space.
+pub(super) const EVERYWHERE: [Point; 2] = [[f32::NEG_INFINITY; 3], [f32::INFINITY; 3]];
 
 impl Partition {
     /// O(n log n).
     pub(super) fn new(points: &[Point], parting: Parting) -> Self {
         let mut order: Vec<u32> = (0..points.len() as u32).collect();
-        let whole = Cell { lo: [f32::NEG_INFINITY; 3], hi: [f32::INFINITY; 3], start: 0, end: points.len() };
+        let [lo, hi] = parting.within;
+        let whole = Cell { lo, hi, start: 0, end: points.len() };
         let branch = part(points, &mut order, whole, parting);
         let (mut cells, mut nodes) = (Vec::new(), Vec::new());
         number(branch, &mut cells, &mut nodes);
@@ -160,7 +166,7 @@ mod tests {
         #[test]
         fn each_vertex_is_in_one_cell_and_boxes_find_theirs(p in prop::collection::vec(prop::array::uniform3(-5i8..6), 0..200), below in 0.2..0.8) {
             let points: Vec<Point> = p.iter().map(|v| v.map(f32::from)).collect();
-            let partition = Partition::new(&points, Parting { most: 7, below });
+            let partition = Partition::new(&points, Parting { most: 7, below, within: EVERYWHERE });
             let mut seen = vec![0; points.len()];
             for (i, cell) in partition.cells.iter().enumerate() {
                 for v in &partition.order[cell.start..cell.end] {

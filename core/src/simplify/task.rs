@@ -14,6 +14,8 @@ pub(crate) struct Input<'a> {
     pub region: Option<&'a [bool]>,
     /// Which vertices stay as they are, besides those of faces that may not change.
     pub fixed: Option<&'a [bool]>,
+    /// The half-open box, from the first corner and before the second one, in which all that moves stays; all of space if it is `None`.
+    pub within: Option<[Point; 2]>,
 }
 
 /// Wishes.
@@ -32,11 +34,21 @@ pub(crate) struct Options {
     pub optimal: bool,
     /// Bounds of the deviation are proved, also where none is wanted.
     pub prove: bool,
+    /// The proved bounds are as low as they can be; else where a deviation is wanted, none is lower than that.
+    pub tight: bool,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Self { triangles: None, max_deviation: None, feature_angle: None, max_turn: 1.2, optimal: true, prove: true }
+        Self {
+            triangles: None,
+            max_deviation: None,
+            feature_angle: None,
+            max_turn: 1.2,
+            optimal: true,
+            prove: true,
+            tight: false,
+        }
     }
 }
 

@@ -25,7 +25,7 @@ fn torus(n: u32, bumps: f64) -> (Vec<Point>, Vec<[u32; 3]>) {
 }
 
 fn all<'a>(points: &'a [Point], faces: &'a [[u32; 3]]) -> Input<'a> {
-    Input { points, faces, region: None, fixed: None }
+    Input { points, faces, region: None, fixed: None, within: None }
 }
 
 fn triangles(points: &[Point], faces: &[[u32; 3]]) -> Vec<Triangle> {

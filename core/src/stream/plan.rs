@@ -29,6 +29,11 @@ impl HomeBox {
         Self { lo, hi }.grown(reach)
     }
 
+    /// The same as a half-open box: from the first corner, and before the second one.
+    pub(crate) fn half_open(&self) -> [[f32; 3]; 2] {
+        [self.lo, self.hi.map(f32::next_up)]
+    }
+
     #[cfg(test)]
     pub(crate) fn meets(&self, other: &Bounds) -> bool {
         (0..3).all(|k| self.lo[k] <= other.hi[k] && self.hi[k] >= other.lo[k])
@@ -53,8 +58,11 @@ impl HomeBox {
     }
 }
 
-/// Samples a leaf should see; more do not make better planes.
+/// Samples a leaf should see; more do not make better planes. Where each is a page to be read from the disk, a quarter of them will do.
 const SAMPLES_PER_CHUNK: u64 = 64;
+
+/// Planes of nodes before this one are shifted, if any are: one along each way. Further ones part what these have shifted.
+const SHIFTED: usize = 8;
 
 /// Heap-ordered kd tree: node 1 is the root, node `i` has children `2i` and `2i + 1`.
 #[derive(Debug)]
@@ -68,32 +76,43 @@ pub(crate) struct Plan {
 impl Plan {
     /// A plan of about `records.len() / chunk_triangles` chunks, a power of two. O(n / chunk_triangles) time and memory.
     pub(crate) fn new(records: &[Record], guide: &Guide<'_>, chunk_triangles: u32) -> Self {
-        let wanted = records.len() as u64 / u64::from(chunk_triangles.max(1));
+        let samples = if guide.is_needed() { SAMPLES_PER_CHUNK / 4 } else { SAMPLES_PER_CHUNK };
+        Self::of_samples((records, guide), chunk_triangles, (samples, 0.0))
+    }
+
+    /// The same for work whose result depends on where the planes lie: they do not depend on memory. `shift`: so much less or more of what is there lies
+    /// below the first planes along each way, so that the planes of several plans lie apart.
+    pub(crate) fn shifted(records: &[Record], guide: &Guide<'_>, chunk_triangles: u32, shift: f64) -> Self {
+        Self::of_samples((records, guide), chunk_triangles, (SAMPLES_PER_CHUNK, shift))
+    }
+
+    fn of_samples(of: (&[Record], &Guide<'_>), chunk_triangles: u32, (samples, shift): (u64, f64)) -> Self {
+        let wanted = of.0.len() as u64 / u64::from(chunk_triangles.max(1));
         let depth = (wanted.max(1) as f64).log2().round() as u32;
         let chunks = 1usize << depth;
         let mut plan = Self { planes: vec![(0, 0.0); chunks], boxes: vec![HomeBox::ALL; chunks], depth };
         if depth > 0 {
-            let mut samples = sample(records, guide, chunks as u64);
-            plan.split(1, &mut samples, HomeBox::ALL);
+            let mut samples = sample(of, chunks as u64 * samples);
+            plan.split(1, (&mut samples, shift), HomeBox::ALL);
         }
         plan
     }
 
-    fn split(&mut self, node: usize, samples: &mut [Sample], cell: HomeBox) {
+    fn split(&mut self, node: usize, (samples, shift): (&mut [Sample], f64), cell: HomeBox) {
         let chunks = self.planes.len();
         if node >= chunks {
             self.boxes[node - chunks] = cell;
             return;
         }
-        let (axis, at) = best_plane(samples, &cell);
+        let (axis, at) = best_plane(samples, &cell, if node < SHIFTED { shift } else { 0.0 });
         self.planes[node] = (axis as u8, at);
         let (mut below, mut above) = (cell, cell);
         below.hi[axis] = at.next_down();
         above.lo[axis] = at;
         let middle = partition(samples, |s| s.middle(axis) < at);
         let (left, right) = samples.split_at_mut(middle);
-        self.split(2 * node, left, below);
-        self.split(2 * node + 1, right, above);
+        self.split(2 * node, (left, shift), below);
+        self.split(2 * node + 1, (right, shift), above);
     }
 
     pub(crate) fn chunks(&self) -> usize {
@@ -178,10 +197,9 @@ impl Sample {
     }
 }
 
-/// Finite triangles for so many chunks, evenly spread over the file. Where each is a page to be read from the disk, there are fewer.
-fn sample(records: &[Record], guide: &Guide<'_>, chunks: u64) -> Vec<Sample> {
+/// About so many finite triangles, evenly spread over the file.
+fn sample((records, guide): (&[Record], &Guide<'_>), wanted: u64) -> Vec<Sample> {
     let n = records.len() as u64;
-    let wanted = chunks * if guide.is_needed() { SAMPLES_PER_CHUNK / 4 } else { SAMPLES_PER_CHUNK };
     let step = (n / wanted.max(1)).max(1);
     let numbers = guide.ahead((0..n).step_by(step as usize).map(|t| t as u32), |t| Some(*t));
     let samples = numbers.filter_map(|t| {
@@ -194,8 +212,8 @@ fn sample(records: &[Record], guide: &Guide<'_>, chunks: u64) -> Vec<Sample> {
     samples.collect()
 }
 
-/// The plane, inside `cell`, that cuts the fewest samples; slightly prefers the middle. O(samples).
-fn best_plane(samples: &[Sample], cell: &HomeBox) -> (usize, f32) {
+/// The plane, inside `cell`, that cuts the fewest samples; slightly prefers the middle, or what lies so far from it by share. O(samples).
+fn best_plane(samples: &[Sample], cell: &HomeBox, shift: f64) -> (usize, f32) {
     const QUANTILES: [f64; 5] = [0.42, 0.46, 0.5, 0.54, 0.58];
     let mut best: Option<(f64, usize, f32)> = None;
     let mut middles = vec![0f32; samples.len()];
@@ -204,7 +222,7 @@ fn best_plane(samples: &[Sample], cell: &HomeBox) -> (usize, f32) {
         // Each is looked for behind the one before it only.
         let (mut rest, mut passed) = (&mut middles[..], 0);
         let planes = QUANTILES.map(|q| {
-            let rank = (samples.len() as f64 * q) as usize - passed;
+            let rank = (samples.len() as f64 * (q + shift)) as usize - passed;
             if rank >= rest.len() {
                 return f32::NAN;
             }
@@ -227,7 +245,7 @@ fn best_plane(samples: &[Sample], cell: &HomeBox) -> (usize, f32) {
                 continue;
             }
             let share = |n: u32| f64::from(n) / samples.len() as f64;
-            let cost = share(cut) + 0.4 * (share(below) - 0.5).abs().powf(1.5);
+            let cost = share(cut) + 0.4 * (share(below) - 0.5 - shift).abs().powf(1.5);
             if best.is_none_or(|(c, ..)| cost < c) {
                 best = Some((cost, axis, at));
             }

@@ -19,6 +19,50 @@ pub(crate) fn count(bits: &[u64]) -> u64 {
     bits.iter().map(|word| u64::from(word.count_ones())).sum()
 }
 
+/// All numbers below `end`.
+pub(crate) fn all(end: usize) -> Vec<u64> {
+    let mut bits = vec![!0; end.div_ceil(64)];
+    if let Some(last) = bits.last_mut().filter(|_| end % 64 > 0) {
+        *last >>= 64 - end % 64;
+    }
+    bits
+}
+
+/// These numbers, all of them below `end`.
+pub(crate) fn of(end: usize, numbers: impl Iterator<Item = u32>) -> Vec<u64> {
+    let mut bits = vec![0; end.div_ceil(64)];
+    numbers.for_each(|number| put(&mut bits, number as usize));
+    bits
+}
+
+/// Takes a number out of the set.
+pub(crate) fn take(bits: &mut [u64], number: usize) {
+    if let Some(word) = bits.get_mut(number / 64) {
+        *word &= !(1 << (number % 64));
+    }
+}
+
+/// The first bit that is set from `at` on, or past the end.
+pub(crate) fn next_one(bits: &[u64], at: usize) -> usize {
+    let mut word = at / 64;
+    let mut mask = !0u64 << (at % 64);
+    while word < bits.len() {
+        let found = bits[word] & mask;
+        if found != 0 {
+            return word * 64 + found.trailing_zeros() as usize;
+        }
+        word += 1;
+        mask = !0;
+    }
+    usize::MAX
+}
+
+/// All bits that are set.
+pub(crate) fn ones(bits: &[u64]) -> impl Iterator<Item = u32> + '_ {
+    let next = |at: usize| Some(next_one(bits, at)).filter(|one| *one != usize::MAX);
+    std::iter::successors(next(0), move |one| next(one + 1)).map(|one| one as u32)
+}
+
 /// A set that many threads put numbers into.
 pub(crate) struct Shared(Vec<AtomicU64>);
 
@@ -48,5 +92,17 @@ mod tests {
         let bits = set.into_bits();
         assert_eq!((bits.len(), count(&bits)), (3, 4));
         assert_eq!((0..500).filter(|number| holds(&bits, *number)).collect::<Vec<_>>(), [0, 63, 64, 129]);
+        assert_eq!(ones(&bits).collect::<Vec<_>>(), [0, 63, 64, 129]);
+        assert_eq!(of(130, ones(&bits)), bits);
+    }
+
+    #[test]
+    fn all_are_there_until_they_are_taken() {
+        for end in [0, 1, 63, 64, 65] {
+            let mut bits = all(end);
+            assert_eq!(ones(&bits).collect::<Vec<_>>(), (0..end as u32).collect::<Vec<_>>());
+            (0..end + 9).for_each(|number| take(&mut bits, number));
+            assert_eq!(count(&bits), 0);
+        }
     }
 }

@@ -3,15 +3,16 @@
 use crate::contract::report::{Features, Residue, Simplified, Smoothed};
 use crate::engine::mesh::Mesh;
 use crate::io::record::{self, Record};
+use crate::util::bits;
 
 /// The corners of a triangle.
 type Corners = [[f32; 3]; 3];
 
 /// Triangles that go and come, and the words for it.
 pub(crate) struct Change {
-    /// Numbers of triangles, ascending.
-    pub(crate) gone: Vec<u32>,
-    pub(crate) added: Vec<Corners>,
+    /// Numbers of triangles, a bit each.
+    pub(crate) gone: Vec<u64>,
+    pub(crate) added: Vec<Record>,
     pub(crate) told: Told,
 }
 
@@ -27,13 +28,18 @@ pub(crate) enum Told {
 impl Change {
     /// Whether the mesh stays as it is.
     pub(crate) fn is_none(&self) -> bool {
-        self.gone.is_empty() && self.added.is_empty()
+        self.count_gone() == 0 && self.added.is_empty()
     }
 
-    /// New triangles as records.
-    pub(crate) fn records(&self) -> Vec<Record> {
-        self.added.iter().map(|corners| record::encode(*corners, 0)).collect()
+    /// How many triangles go.
+    pub(crate) fn count_gone(&self) -> u64 {
+        bits::count(&self.gone)
     }
+}
+
+/// New triangles as records.
+pub(super) fn encoded(triangles: impl Iterator<Item = Corners>) -> Vec<Record> {
+    triangles.map(|corners| record::encode(corners, 0)).collect()
 }
 
 /// How many vertices of a mesh have other places now.
@@ -46,21 +52,19 @@ pub(super) fn is_moved(mesh: &Mesh, places: &[[f32; 3]], face: &[u32; 3]) -> boo
     face.iter().any(|vertex| mesh.vertices().get(*vertex as usize) != places.get(*vertex as usize))
 }
 
-/// The triangles of a mesh that other places of its vertices change: their numbers, and their new corners.
-pub(super) fn moved(mesh: &Mesh, places: &[[f32; 3]]) -> (Vec<u32>, Vec<Corners>) {
+/// The triangles of a mesh that other places of its vertices change: their numbers, a bit each, and what they become.
+pub(super) fn moved(mesh: &Mesh, places: &[[f32; 3]]) -> (Vec<u64>, Vec<Record>) {
     let place = |vertex: u32| places.get(vertex as usize).copied().unwrap_or_default();
-    let changed = (0_u32..).zip(mesh.faces()).filter(|(_, face)| is_moved(mesh, places, face));
-    changed.map(|(number, face)| (number, face.map(place))).unzip()
+    let changed = || (0_u32..).zip(mesh.faces()).filter(|(_, face)| is_moved(mesh, places, face));
+    let gone = bits::of(mesh.faces().len(), changed().map(|(number, _)| number));
+    (gone, encoded(changed().map(|(_, face)| face.map(place))))
 }
 
 /// The triangles that go and come where another mesh takes the place of this one; `origins`: the triangle that each new one is, or [`u32::MAX`].
-pub(super) fn replaced(mesh: &Mesh, (points, faces, origins): (&[[f32; 3]], &[[u32; 3]], &[u32])) -> (Vec<u32>, Vec<Corners>) {
-    let mut stays = vec![false; mesh.faces().len()];
-    for origin in origins {
-        stays.iter_mut().skip(*origin as usize).take(1).for_each(|stays| *stays = true);
-    }
-    let gone = (0_u32..).zip(&stays).filter(|(_, stays)| !**stays).map(|(number, _)| number).collect();
+pub(super) fn replaced(mesh: &Mesh, (points, faces, origins): (&[[f32; 3]], &[[u32; 3]], &[u32])) -> (Vec<u64>, Vec<Record>) {
+    let mut gone = bits::all(mesh.faces().len());
+    origins.iter().for_each(|origin| bits::take(&mut gone, *origin as usize));
     let place = |vertex: u32| points.get(vertex as usize).copied().unwrap_or_default();
     let new = faces.iter().zip(origins).filter(|(_, origin)| **origin == u32::MAX);
-    (gone, new.map(|(face, _)| face.map(place)).collect())
+    (gone, encoded(new.map(|(face, _)| face.map(place))))
 }

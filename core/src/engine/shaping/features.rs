@@ -1,10 +1,11 @@
 //! Features that a profile does not want: looked for in a mesh that is good, and told of in its report.
 
-use super::change::{Change, Told};
+use super::change::{Change, Told, encoded};
 use crate::contract::report::{Feature, Features, MOST_LISTED, Report};
 use crate::contract::settings::Profile;
 use crate::defeature::{self, Limits as Below, Removed};
 use crate::engine::mesh::Mesh;
+use crate::util::bits;
 
 /// The features that the profile does not want, if there are any such.
 pub(super) fn limits_of(profile: &Profile) -> Option<Below> {
@@ -22,7 +23,8 @@ pub(super) fn limits_of(profile: &Profile) -> Option<Below> {
 pub(super) fn find(mesh: &Mesh, below: &Below) -> Result<Change, String> {
     let removed = defeature::defeature(mesh.vertices(), mesh.faces(), below).map_err(|error| error.to_string())?;
     let told = Told::Features(told(&removed));
-    Ok(Change { gone: removed.removed_triangles, added: removed.added, told })
+    let gone = bits::of(mesh.faces().len(), removed.removed_triangles.into_iter());
+    Ok(Change { gone, added: encoded(removed.added.into_iter()), told })
 }
 
 /// Features that were found, for the report.

@@ -5,6 +5,7 @@
 mod change;
 mod corrections;
 mod features;
+mod large;
 mod residue;
 mod simplifying;
 mod smoothing;
@@ -92,6 +93,10 @@ impl Step {
     ) -> Result<std::result::Result<Change, Told>> {
         if matches!(self, Self::Features(_)) && !report.verdict.good {
             return Ok(Err(self.refused("the mesh is not good, so no feature of it was looked for".into())));
+        }
+        if matches!(self, Self::Simplify) && large::is_large(records.len()) {
+            let found = large::simplify((path, records), &large::Sizes::USUAL, work)?;
+            return Ok(found.map_err(|why| self.refused(why)));
         }
         let needed = records.len() as u64 * self.bytes_a_triangle();
         if needed > work.limits.memory_bytes {
@@ -190,18 +195,24 @@ pub(crate) fn is_no_worse(report: &Report, judged: &Report) -> bool {
         || !report.verdict.good && before.iter().zip(counts(&judged.before)).all(|(before, after)| after <= *before)
 }
 
-/// Completes the report of a repair by what was `judged` of the changed mesh. `edit`: all that was done, of so many records.
-pub(crate) fn tell(report: &mut Report, (step, change): (&Step, Change), judged: Report, edit: Option<(&Edit, usize)>) {
+/// Completes the report of a repair by what was `judged` of the changed mesh, and how many triangles have gone and come. `edit`: all that was done, of so
+/// many records.
+pub(crate) fn tell(
+    report: &mut Report,
+    (step, told, [gone, added]): (&Step, Told, [u64; 2]),
+    judged: Report,
+    edit: Option<(&Edit, usize)>,
+) {
     if report.outcome == Outcome::Clean {
         report.outcome = Outcome::Repaired;
     }
-    let note = format!("{} triangles removed, {} added", change.gone.len(), change.added.len());
-    judging::add_last(report, step.repair(), change.told.count(), note);
+    let note = format!("{gone} triangles removed, {added} added");
+    judging::add_last(report, step.repair(), told.count(), note);
     if let Some((edit, records)) = edit {
         report.edit = edit.summary(records);
         report.edit_records = report.limits.list_edit.then(|| edit.listed());
     }
     judging::certify_anew(report, judged.certificate);
     (report.after, report.thin_walls) = (Some(judged.before), judged.thin_walls);
-    change.told.put(report);
+    told.put(report);
 }

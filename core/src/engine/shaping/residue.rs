@@ -129,7 +129,8 @@ fn fewer(
         feature_angle: Some(work.profile.keep_edges_degrees.to_radians()),
         ..Options::default()
     };
-    let input = Input { points: places, faces: mesh.faces(), region: Some(&region), fixed: Some(&repaired.is_fixed) };
+    let input =
+        Input { points: places, faces: mesh.faces(), region: Some(&region), fixed: Some(&repaired.is_fixed), within: None };
     let mut outcome = simplify::simplify(&input, &options).map_err(|error| error.to_string())?;
     // A triangle that only moved is a new one, too.
     for origin in &mut outcome.origins {

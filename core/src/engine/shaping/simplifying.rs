@@ -8,10 +8,20 @@ use crate::engine::work::Work;
 use crate::simplify::{self, Ended, Input, Options};
 
 /// How many triangles a profile wants of so many.
-fn wanted(profile: &Profile, triangles: usize) -> Option<usize> {
+pub(super) fn wanted(profile: &Profile, triangles: usize) -> Option<usize> {
     let count = (profile.simplify_triangles > 0).then(|| usize::try_from(profile.simplify_triangles).unwrap_or(usize::MAX));
     let share = (profile.simplify_ratio > 0.0).then_some((triangles as f64 * profile.simplify_ratio) as usize);
     count.into_iter().chain(share).min()
+}
+
+/// Why more triangles are left than were wanted.
+pub(super) fn why_not(wanted: usize, ended: Ended, within: Option<f64>) -> String {
+    let why = match ended {
+        Ended::Edges => "fewer would cross, turn over, or lose an edge of the part",
+        _ if within.is_some() => "fewer would be farther off than allowed",
+        _ => "fewer would be farther off than 1 % of the diagonal",
+    };
+    format!("{wanted} triangles were asked for; {why}")
 }
 
 /// The mesh with fewer triangles, or why that cannot be.
@@ -25,17 +35,11 @@ pub(super) fn simplify(mesh: &Mesh, work: Work<'_>) -> Result<Change, String> {
         feature_angle: Some(profile.keep_edges_degrees.to_radians()),
         ..Options::default()
     };
-    let input = Input { points: mesh.vertices(), faces: mesh.faces(), region: None, fixed: None };
+    let input = Input { points: mesh.vertices(), faces: mesh.faces(), region: None, fixed: None, within: None };
     let outcome = simplify::simplify(&input, &options).map_err(|error| error.to_string())?;
     let proved = outcome.proved.unwrap_or_default();
-    let why_not = wanted.filter(|wanted| outcome.faces.len() > *wanted).map(|wanted| {
-        let why = match outcome.ended {
-            Ended::Edges => "fewer would cross, turn over, or lose an edge of the part",
-            _ if within.is_some() => "fewer would be farther off than allowed",
-            _ => "fewer would be farther off than 1 % of the diagonal",
-        };
-        format!("{wanted} triangles were asked for; {why}")
-    });
+    let left = outcome.faces.len();
+    let why_not = wanted.filter(|wanted| left > *wanted).map(|wanted| why_not(wanted, outcome.ended, within));
     let told = Simplified {
         before: mesh.faces().len() as u64,
         after: outcome.faces.len() as u64,

@@ -134,6 +134,7 @@ proptest! {
         let new = record::encode(THERE, 7777);
         let mut want: Vec<Record> = (0..).zip(&between).filter(|(k, _)| !gone.contains(k)).map(|(_, r)| *r).collect();
         want.extend([new; 2]);
+        let gone = bits::of(between.len(), gone.into_iter());
         let then = edit.then(&input, &gone, vec![new; 2], RepairName::Defeature);
         let mut got = written(&then, &input);
         prop_assert_eq!(then.output_records(input.len()), want.len() as u64);

@@ -22,7 +22,7 @@ pub(crate) fn count(bits: &[u64]) -> u64 {
 /// All numbers below `end`.
 pub(crate) fn all(end: usize) -> Vec<u64> {
     let mut bits = vec![!0; end.div_ceil(64)];
-    if let Some(last) = bits.last_mut().filter(|_| end % 64 > 0) {
+    if let Some(last) = bits.last_mut().filter(|_| !end.is_multiple_of(64)) {
         *last >>= 64 - end % 64;
     }
     bits

@@ -4,10 +4,11 @@ use super::options::Units;
 use super::program::ReadError;
 use super::tool::{Shape, Tool};
 use crate::curves::{Finding, Findings};
-use crate::util::legible::legible;
+use crate::util::legible::{escaped, legible};
 
 fn bad(text: &str, problem: impl Into<String>) -> ReadError {
-    ReadError::Tool { text: legible(text), problem: problem.into() }
+    // The problem may have words of the text, and these any character.
+    ReadError::Tool { text: legible(text), problem: escaped(&problem.into(), 200) }
 }
 
 /// Reads a tool as the command line has it: its number, `=`, a form, and `key=value` in any order.
@@ -137,6 +138,11 @@ mod tests {
         assert_eq!(parse("1=taper,d=6,a=15,tip=0.5"), Ok(Tool::new(1, Shape::Taper { tip: 0.5, angle: 15.0 }, 6.0)));
         for text in ["3=ball", "3=cube,d=6", "3=bull,d=6", "3=ball,d=-6", "3=ball,x=6", "99999999999=ball,d=1", "", "="] {
             assert!(matches!(parse(text), Err(ReadError::Tool { .. })), "{text}");
+        }
+        // Words of the text are told without what would damage a line or a terminal.
+        for text in ["2=ta\u{0}per,d=6", "2=ball,\u{1b}d=6", "2=ball,d\u{7}", "2=ball,d=6\u{202e}"] {
+            let told = parse(text).unwrap_err().to_string();
+            assert!(told.chars().all(|one| !one.is_control() && one != '\u{202e}'), "{told:?}");
         }
     }
 

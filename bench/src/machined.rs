@@ -10,7 +10,7 @@ use suture_bench::field::{Crests, Field, Move, Stock, moves};
 
 use crate::{mesh, picture};
 
-/// What to simulate, and where to put it.
+/// A path to simulate, its workpiece, and where to put the result.
 #[derive(Args)]
 pub(crate) struct Options {
     /// G-code of straight moves in absolute millimetres.

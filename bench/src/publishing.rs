@@ -1,4 +1,4 @@
-//! What measures and then publishes: its common words, its raw file, and the page that is made anew.
+//! Measurements that are published: their common words, their raw file, and the page that is made anew.
 
 use std::error::Error;
 use std::path::{Path, PathBuf};

@@ -8,7 +8,7 @@ use clap::Args;
 use crate::compare;
 use crate::publishing::{Closing, closing};
 
-/// What `simplify` measures.
+/// Choices of the command `simplify`.
 #[derive(Args)]
 pub(crate) struct SimplifyChoices {
     /// About how many triangles the meshes have; ten million are to be asked for.

@@ -1,4 +1,4 @@
-//! What became of a mesh whose triangles were made fewer, and what that cost.
+//! A mesh whose triangles were made fewer, and what that cost.
 
 use serde::{Deserialize, Serialize};
 

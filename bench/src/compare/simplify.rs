@@ -20,7 +20,7 @@ use super::simplified::{Nearness, Simplified, Simplifier};
 use super::trial::listen;
 use crate::mesh::{self, Triangle};
 
-/// What is measured.
+/// Meshes, programs and runs of a measurement.
 pub(crate) struct Asked {
     /// About how many triangles the meshes have.
     pub(crate) sizes: Vec<u64>,

@@ -75,6 +75,14 @@ pub enum Elementary {
 }
 
 impl Elementary {
+    /// The cone with an apex on the axis of a frame, whose distance from the axis grows by so much with the height; it is below the apex if that is negative.
+    pub(crate) fn cone(apex: Point, axis: &Frame, growth: f64) -> Self {
+        let [x, y, z] = axis.axes;
+        // The surface is above the apex of its own frame.
+        let axes = if growth > 0.0 { [x, y, z] } else { [x, scale(y, -1.0), scale(z, -1.0)] };
+        Self::Cone { frame: Frame { origin: apex, axes }, slope: growth.abs() }
+    }
+
     /// A word for it.
     #[must_use]
     pub fn name(&self) -> &'static str {

@@ -59,7 +59,7 @@ impl Work {
         let mut round = Round { removed: Vec::new(), left: Vec::new(), edits: Vec::new() };
         for ((candidate, plan), is_pierced) in candidates.into_iter().zip(plans).zip(pierced) {
             // Part of a feature that is removed already, or what took the place of one: that would have no end.
-            if candidate.triangles.iter().any(|t| state[*t as usize] == GONE) || self.is_done(&candidate) {
+            if candidate.entry.triangles.iter().any(|t| state[*t as usize] == GONE) || self.is_done(&candidate) {
                 continue;
             }
             let edit = match plan {
@@ -81,7 +81,7 @@ impl Work {
                 Err(reason) => {
                     // What waits stays whole until its turn comes: a chamfer inside of it is not taken first.
                     if reason == Reason::Rounds {
-                        candidate.triangles.iter().for_each(|t| state[*t as usize] = HELD.max(state[*t as usize]));
+                        candidate.entry.triangles.iter().for_each(|t| state[*t as usize] = HELD.max(state[*t as usize]));
                     }
                     round.left.extend(self.features(candidate, Outcome::Left(reason)));
                 }
@@ -114,30 +114,27 @@ impl Work {
     /// Whether a feature of this kind, place and size was removed before.
     fn is_done(&self, candidate: &Candidate) -> bool {
         let near = |centre: Point, size: f64| {
-            (size - candidate.size).abs() <= 0.01 * size && distance(centre, candidate.centre) <= 0.01 * size
+            (size - candidate.entry.size).abs() <= 0.01 * size && distance(centre, candidate.entry.centre) <= 0.01 * size
         };
-        self.done.iter().any(|(kind, centre, size)| *kind == candidate.kind && near(*centre, *size))
+        self.done.iter().any(|(kind, centre, size)| *kind == candidate.entry.kind && near(*centre, *size))
     }
 
-    /// What is told of a candidate: itself, then what goes with it.
+    /// The features of a candidate: itself, then those that go with it.
     fn features(&self, candidate: Candidate, outcome: Outcome) -> Vec<Feature> {
         let of_input = |triangles: &[u32]| {
             let mut own: Vec<u32> = triangles.iter().map(|t| self.origins[*t as usize]).filter(|t| *t != ADDED).collect();
             own.sort_unstable();
             own
         };
-        let mut rest = candidate.triangles;
-        let mut kin_own: Vec<u32> = candidate.kin.iter().flat_map(|k| k.triangles.iter().copied()).collect();
-        kin_own.sort_unstable();
-        rest.retain(|t| kin_own.binary_search(t).is_err());
-        let triangles = of_input(&rest);
-        let Candidate { kind, centre, axis, size, length, depth, confidence, kin, .. } = candidate;
-        let mut told = vec![Feature { kind, centre, axis, size, length, depth, confidence, triangles, outcome }];
-        told.extend(kin.into_iter().map(|Entry { kind, centre, axis, size, length, depth, triangles }| {
+        let Candidate { mut entry, confidence, kin, .. } = candidate;
+        let mut of_kin: Vec<u32> = kin.iter().flat_map(|k| k.triangles.iter().copied()).collect();
+        of_kin.sort_unstable();
+        entry.triangles.retain(|t| of_kin.binary_search(t).is_err());
+        let feature = |Entry { kind, centre, axis, size, length, depth, triangles }| {
             let triangles = of_input(&triangles);
             Feature { kind, centre, axis, size, length, depth, confidence, triangles, outcome }
-        }));
-        told
+        };
+        std::iter::once(entry).chain(kin).map(feature).collect()
     }
 
     /// Makes edits, and gives the segments of the new mesh; leaves everything as it was where the mesh would not be closed and

@@ -90,13 +90,13 @@ impl Edit {
         ones(&self.flipped).for_each(|t| edit.flip(stayed.record(t)));
         for t in ones(&self.dropped).map(|t| stayed.record(t)) {
             bits::put(&mut edit.dropped, t as usize);
-            edit.flipped[t as usize / 64] &= !(1 << (t % 64));
+            bits::take(&mut edit.flipped, t as usize);
         }
         for (t, change) in self.changes.into_iter().map(|(t, change)| (stayed.record(t), change)) {
             if change == Change::Flip {
                 edit.flip(t);
             } else {
-                edit.flipped[t as usize / 64] &= !(1 << (t % 64));
+                bits::take(&mut edit.flipped, t as usize);
                 edit.changes.push((t, change));
             }
         }

@@ -1,4 +1,4 @@
-//! What is to be proved anew where a few faces of the second mesh have changed since the last proof.
+//! The proof anew where a few faces of the second mesh have changed since the last proof.
 //!
 //! A place of the first mesh that was near to the second one is so still, unless it was near to a face that is gone: only triangles as near as that to
 //! such a face are asked about. Faces that did not change are as near to the first mesh as before. All this is proved of parts of both
@@ -15,7 +15,7 @@ use crate::proof::pairing::Pairing;
 use crate::proof::proving::{Asked, Proved, Verdict, prove_of};
 use crate::util::ids::NONE;
 
-/// What has changed since a proof.
+/// Faces that have changed since a proof.
 pub(crate) struct Changes<'a> {
     /// Faces of the second mesh that are gone.
     pub(crate) gone: Vec<Triangle>,
@@ -102,7 +102,7 @@ fn numbers(count: usize, faces: &[[u32; 3]], chosen: &[u32]) -> Vec<u32> {
     numbers
 }
 
-/// Those that have numbers.
+/// The entries of vertices that have numbers.
 fn numbered<T: Copy>(all: &[T], numbers: &[u32]) -> Vec<T> {
     all.iter().zip(numbers).filter(|(_, number)| **number != NONE).map(|(one, _)| *one).collect()
 }

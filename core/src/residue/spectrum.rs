@@ -110,7 +110,7 @@ pub(super) fn search(list: &[Point], [first, second, _]: [Point; 3], [shortest, 
     Some(Hint { across, pitch: std::f64::consts::TAU / wave, height: at(0.98) - at(0.02), share: share.min(1.0) })
 }
 
-/// What waves in one direction, `count` of them by equal steps of wave number, explain of the sum of squares of heights. Each place's phase goes on from
+/// The part of the sum of squares of heights that waves in one direction explain, `count` of them by equal steps of wave number. Each place's phase goes on from
 /// wave to wave by one turn: a sine for each would take ten times as long.
 fn shares(list: &[Point], angle: f64, (low, step, count): (f64, f64, usize)) -> Vec<f64> {
     let (sin, cos) = angle.sin_cos();

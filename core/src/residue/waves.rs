@@ -282,7 +282,7 @@ fn is_same(one: Option<Hint>, other: Option<Hint>) -> bool {
     (one.pitch - other.pitch).abs() < PITCH * one.pitch.max(other.pitch) && dot(one.across, other.across).abs() > DIRECTION
 }
 
-/// What several patches say together: means by their triangles, and of the largest one the direction.
+/// Several patches as one: means by their triangles, and of the largest one the direction.
 fn suspect(mesh: Mesh<'_>, members: &[usize], patches: &[Vec<u32>], hints: &[Option<Hint>]) -> Option<Suspect> {
     let said: Vec<(f64, Hint)> =
         members.iter().filter_map(|patch| Some((patches[*patch].len() as f64, hints[*patch]?))).collect();

@@ -9,7 +9,7 @@ use crate::simplify::held::Held;
 use crate::simplify::legal;
 use crate::simplify::net::{Constraints, Net};
 use crate::simplify::parting::Parting;
-use crate::simplify::partition::{EVERYWHERE, Parting as Planes};
+use crate::simplify::partition::{EVERYWHERE, Planes};
 use crate::simplify::rounds::{self, Goal};
 use crate::simplify::task::{Ended, Input, Options, Outcome};
 use crate::util::ids::NONE;

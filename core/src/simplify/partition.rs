@@ -45,7 +45,7 @@ enum Branch {
 
 /// How to part.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Parting {
+pub(super) struct Planes {
     /// Vertices of a cell, at most, unless no plane parts them.
     pub(super) most: usize,
     /// The share of vertices below each plane.
@@ -59,11 +59,11 @@ pub(super) const EVERYWHERE: [Point; 2] = [[f32::NEG_INFINITY; 3], [f32::INFINIT
 
 impl Partition {
     /// O(n log n).
-    pub(super) fn new(points: &[Point], parting: Parting) -> Self {
+    pub(super) fn new(points: &[Point], planes: Planes) -> Self {
         let mut order: Vec<u32> = (0..points.len() as u32).collect();
-        let [lo, hi] = parting.within;
+        let [lo, hi] = planes.within;
         let whole = Cell { lo, hi, start: 0, end: points.len() };
-        let branch = part(points, &mut order, whole, parting);
+        let branch = part(points, &mut order, whole, planes);
         let (mut cells, mut nodes) = (Vec::new(), Vec::new());
         number(branch, &mut cells, &mut nodes);
         Self { cells, order, nodes }
@@ -88,12 +88,12 @@ impl Partition {
     }
 }
 
-fn part(points: &[Point], order: &mut [u32], cell: Cell, parting: Parting) -> Branch {
-    if order.len() <= parting.most {
+fn part(points: &[Point], order: &mut [u32], cell: Cell, planes: Planes) -> Branch {
+    if order.len() <= planes.most {
         order.sort_unstable();
         return Branch::Leaf(cell);
     }
-    let Some((axis, at, count)) = plane(points, order, parting) else {
+    let Some((axis, at, count)) = plane(points, order, planes) else {
         order.sort_unstable();
         return Branch::Leaf(cell);
     };
@@ -101,18 +101,18 @@ fn part(points: &[Point], order: &mut [u32], cell: Cell, parting: Parting) -> Br
     let (mut below, mut above) = (cell, cell);
     (below.hi[axis], above.lo[axis]) = (at, at);
     (below.end, above.start) = (cell.start + count, cell.start + count);
-    let (below, above) = rayon::join(|| part(points, low, below, parting), || part(points, high, above, parting));
+    let (below, above) = rayon::join(|| part(points, low, below, planes), || part(points, high, above, planes));
     Branch::Plane { axis, at, below: Box::new(below), above: Box::new(above) }
 }
 
 /// A plane with vertices on both sides, across the longest side if there is one, and how many are below; these are put first.
-fn plane(points: &[Point], order: &mut [u32], parting: Parting) -> Option<(usize, f32, usize)> {
+fn plane(points: &[Point], order: &mut [u32], planes: Planes) -> Option<(usize, f32, usize)> {
     let mut bounds = Bounds::EMPTY;
     order.iter().for_each(|v| bounds.include(&[points[*v as usize]]));
     let width = |k: &usize| f64::from(bounds.hi[*k]) - f64::from(bounds.lo[*k]);
     let mut axes = [0, 1, 2];
     axes.sort_by(|a, b| width(b).total_cmp(&width(a)));
-    let wanted = (order.len() as f64 * parting.below) as usize;
+    let wanted = (order.len() as f64 * planes.below) as usize;
     for axis in axes.into_iter().filter(|k| width(k) > 0.0) {
         let along = |v: &u32| points[*v as usize][axis];
         order.select_nth_unstable_by(wanted.min(order.len() - 1), |a, b| along(a).total_cmp(&along(b)));
@@ -166,7 +166,7 @@ mod tests {
         #[test]
         fn each_vertex_is_in_one_cell_and_boxes_find_theirs(p in prop::collection::vec(prop::array::uniform3(-5i8..6), 0..200), below in 0.2..0.8) {
             let points: Vec<Point> = p.iter().map(|v| v.map(f32::from)).collect();
-            let partition = Partition::new(&points, Parting { most: 7, below, within: EVERYWHERE });
+            let partition = Partition::new(&points, Planes { most: 7, below, within: EVERYWHERE });
             let mut seen = vec![0; points.len()];
             for (i, cell) in partition.cells.iter().enumerate() {
                 for v in &partition.order[cell.start..cell.end] {

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use crate::geometry::sums::Bounds;
 use crate::simplify::cell::{Obstacle, Rules, Work};
 use crate::simplify::net::Net;
-use crate::simplify::partition::{Parting, Partition};
+use crate::simplify::partition::{Partition, Planes};
 use crate::simplify::patch::{FIXED, Patch};
 use crate::simplify::queue::BUCKETS;
 use crate::util::ids::NONE;
@@ -37,8 +37,8 @@ struct Parted {
 }
 
 impl Parted {
-    fn new(net: &Net, parting: Parting) -> Self {
-        let partition = Partition::new(&net.points, parting);
+    fn new(net: &Net, planes: Planes) -> Self {
+        let partition = Partition::new(&net.points, planes);
         let mut places = vec![0_u32; net.points.len()];
         let mut cells = vec![0_u32; net.points.len()];
         for (c, cell) in partition.cells.iter().enumerate() {
@@ -135,8 +135,8 @@ pub(super) struct Round {
 }
 
 /// Simplifies by one round.
-pub(super) fn round(net: &mut Net, rules: Rules, parting: Parting, goal: Goal) -> Round {
-    let parted = Parted::new(net, parting);
+pub(super) fn round(net: &mut Net, rules: Rules, planes: Planes, goal: Goal) -> Round {
+    let parted = Parted::new(net, planes);
     let cells = parted.partition.cells.len();
     let mut works: Vec<Work> = (0..cells).into_par_iter().with_max_len(1).map(|c| parted.work(net, c, rules, false)).collect();
     advance(&mut works, wanted(net, &parted, goal));

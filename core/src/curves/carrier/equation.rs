@@ -3,7 +3,7 @@
 use super::Carrier;
 use crate::curves::curve::{Arc, Shape};
 use crate::curves::elementary::{Elementary, Frame, Told};
-use crate::curves::vector::{Affine, Point, cross, distance, dot, norm, scale, sub, unit};
+use crate::curves::vector::{Affine, Point, cross, distance, dot, norm, sub, unit};
 
 /// Lengths and angles below this, in sizes, are rounding of files.
 const NOTHING: f64 = 1e-9;
@@ -61,10 +61,7 @@ fn cone(frame: &Frame, radius: f64, growth: f64) -> Option<Elementary> {
     if growth.abs() <= NOTHING {
         return (radius > 0.0).then_some(Elementary::Cylinder { frame: *frame, radius });
     }
-    let [x, y, z] = frame.axes;
-    let axes = if growth > 0.0 { [x, y, z] } else { [x, scale(y, -1.0), scale(z, -1.0)] };
-    let origin = frame.outside([0.0, 0.0, -radius / growth]);
-    Some(Elementary::Cone { frame: Frame { origin, axes }, slope: growth.abs() })
+    Some(Elementary::cone(frame.outside([0.0, 0.0, -radius / growth]), frame, growth))
 }
 
 /// A straight line or a circle in a plane with the axis, turned about it.

@@ -16,11 +16,11 @@ pub struct FilledNetwork {
     pub loops: Option<Loops>,
     /// Circles by which whole spheres and tori are divided, of which the file has none.
     pub added: Vec<Shape>,
-    /// What was filled; numbers of curves are those of the network, and go on with those that close gaps or divide.
+    /// Outlines that were filled; numbers of curves are those of the network, and go on with those that close gaps or divide.
     pub outlines: Vec<Outline>,
     /// The number of the face of each; none of loops.
     pub faces: Vec<usize>,
-    /// What came of each.
+    /// Surfaces, triangles and a report of each.
     pub filled: Filled,
     /// Numbers of the faces of which nothing is known that could be filled: no curve bounds them, and they are no whole sphere or torus.
     pub bare: Vec<usize>,

@@ -6,7 +6,7 @@
 use super::space;
 use super::strand::Kind;
 use crate::curves::elementary::{Elementary, Frame, round};
-use crate::curves::vector::{Point, cross, distance, norm, scale, sub, unit};
+use crate::curves::vector::{Point, cross, distance, norm, sub, unit};
 
 /// Axes that are looked at, at most.
 const AXES: usize = 12;
@@ -127,10 +127,7 @@ fn cone(axis: &Frame, probes: &[Point]) -> Option<Elementary> {
         return None;
     }
     let apex = axis.outside([0.0, 0.0, b - a / slope]);
-    let [x, y, z] = axis.axes;
-    // The surface above the apex.
-    let axes = if slope > 0.0 { [x, y, z] } else { [x, scale(y, -1.0), scale(z, -1.0)] };
-    Some(Elementary::Cone { frame: Frame { origin: apex, axes }, slope: slope.abs() })
+    Some(Elementary::cone(apex, axis, slope))
 }
 
 fn sphere(probes: &[Point]) -> Option<Elementary> {

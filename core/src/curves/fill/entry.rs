@@ -112,10 +112,7 @@ fn made(
 ) -> Result<Filled, FillError> {
     let strands = strands(shapes, outlines)?;
     let tried: Vec<Tried> = (0..outlines.len())
-        .map(|number| Tried {
-            told: origins.get(number).and_then(|origin| origin.told).filter(|_| options.told),
-            ..Tried::default()
-        })
+        .map(|number| Tried { told: origins.get(number).and_then(|origin| origin.told), ..Tried::default() })
         .collect();
     let mut divided = network::divide(&strands, outlines, options, &[]);
     if options.size.is_none() {

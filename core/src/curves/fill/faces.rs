@@ -14,7 +14,7 @@ use crate::curves::{Network, Use};
 const SAMPLES: u32 = 8;
 const NEAR: f64 = 1e-5;
 
-/// What a file says of an outline.
+/// The face of an outline, and its file's words of it.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Origin {
     /// Its face.
@@ -61,7 +61,7 @@ pub(super) fn outlines(network: &Network, how: &loops::Options, is_told: bool) -
     }
     all.outlines = with_outer_loops_first(&shapes, std::mem::take(&mut all.outlines));
     let given = network.curves.len();
-    for uses in all.outlines.iter_mut().flat_map(|face| std::iter::once(&mut face.outer).chain(&mut face.inner)) {
+    for uses in all.outlines.iter_mut().flat_map(Outline::rings_mut) {
         if uses.iter().all(|one| one.curve < given) {
             sense::turn(&shapes, uses, NEAR);
         }
@@ -130,7 +130,7 @@ fn with_shared_curves(shapes: &[&Shape], mut outlines: Vec<Outline>, doubles: &[
         })
         .collect();
     for outline in &mut outlines {
-        for one in std::iter::once(&mut outline.outer).chain(&mut outline.inner).flatten() {
+        for one in outline.rings_mut().flatten() {
             if let Some((other, is_against)) = stands.get(&one.curve) {
                 *one = Use { curve: *other, is_reversed: one.is_reversed != *is_against };
             }

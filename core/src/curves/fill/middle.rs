@@ -4,7 +4,7 @@ use super::blend::{self, Curves};
 use super::chart::Chart;
 use super::fans;
 use super::layout::Rim;
-use super::patch::{Meshed, Task};
+use super::patch::{CUTS, Meshed, Task};
 use super::report::{Method, Report, Surface};
 use super::star;
 use super::strand::Strand;
@@ -12,9 +12,6 @@ use super::unrolled;
 use crate::curves::Use;
 use crate::curves::elementary::{Elementary, Told};
 use crate::curves::vector::{Point, distance};
-
-/// Rounds in which spokes are divided, at most.
-const CUTS: u32 = 12;
 
 impl Task<'_> {
     /// A cone that the file says, whose apex is within its only ring: straight to that from the curves.

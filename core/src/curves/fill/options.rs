@@ -104,6 +104,11 @@ impl Outline {
     pub fn rings(&self) -> impl Iterator<Item = &Vec<Use>> + Clone {
         std::iter::once(&self.outer).chain(&self.inner)
     }
+
+    /// The same, to be changed.
+    pub(super) fn rings_mut(&mut self) -> impl Iterator<Item = &mut Vec<Use>> {
+        std::iter::once(&mut self.outer).chain(&mut self.inner)
+    }
 }
 
 impl From<&Loop> for Outline {

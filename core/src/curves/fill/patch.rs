@@ -27,8 +27,8 @@ const GAP: f64 = 3e-5;
 /// Products of points within and on outlines that heights may cost.
 const COSTLIEST: f64 = 1e8;
 
-/// Rounds in which cuts are divided, at most.
-const CUTS: u32 = 12;
+/// Rounds in which cuts, or spokes to a centre, are divided, at most.
+pub(super) const CUTS: u32 = 12;
 
 /// An outline with all that it needs.
 #[derive(Clone, Copy, Debug)]

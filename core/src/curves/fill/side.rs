@@ -66,7 +66,7 @@ fn turning(centre: Point, ring: &[Rim]) -> Point {
     pairs.fold([0.0; 3], |sum, (one, next)| add(sum, cross(sub(one.point, centre), sub(next.point, centre))))
 }
 
-/// What a ring on a torus is moved by, so that the part between it and the one that is cut to it is on the side that is meant: a turn or nothing. `shift` is
+/// A turn or nothing, by which a ring on a torus is moved so that the part between it and the one that is cut to it is on the side that is meant. `shift` is
 /// what the first ring grows by, the places are the ends of the cut.
 pub(super) fn turn_more(turned: &Turned, shift: [f64; 2], [from, to]: [[f64; 2]; 2], is_left: Option<bool>) -> [f64; 2] {
     let (Some(is_left), true) = (is_left, turned.is_tube()) else { return [0.0; 2] };

@@ -48,16 +48,20 @@ fn face(rings: &[&[i32]], told: Option<(Elementary, bool)>) -> Face {
     }
 }
 
-fn filled(shapes: Vec<Shape>, faces: Vec<Face>) -> FilledNetwork {
-    let network = Network {
+fn network(shapes: Vec<Shape>, faces: Vec<Face>) -> Network {
+    Network {
         unit: Unit { name: "mm".into(), millimetres: 1.0 },
         resolution: None,
         digits: 17,
         curves: shapes.into_iter().map(curve).collect(),
         faces,
         findings: Vec::new(),
-    };
-    fill_network(&network, (true, &loops::Options::default()), &Options { chord: Some(2e-3), ..Options::default() }).unwrap()
+    }
+}
+
+fn filled(shapes: Vec<Shape>, faces: Vec<Face>) -> FilledNetwork {
+    let options = Options { chord: Some(2e-3), ..Options::default() };
+    fill_network(&network(shapes, faces), (true, &loops::Options::default()), &options).unwrap()
 }
 
 /// Each edge is passed once in each direction.
@@ -81,6 +85,12 @@ fn check(result: &FilledNetwork, wanted: f64, name: &str) {
         let Surface::Carrier(carrier) = &result.filled.surfaces[*outline as usize] else { panic!("{name}") };
         assert!(triangle.iter().all(|corner| carrier.distance(mesh.points[*corner as usize]) < 1e-9), "{name}");
     }
+}
+
+/// The height over the frame's plane that is the farthest from it.
+fn farthest(result: &FilledNetwork) -> f64 {
+    let heights = result.filled.mesh.points.iter().map(|point| FRAME.inside(*point)[2]);
+    heights.fold(0.0, |most: f64, z| if z.abs() > most.abs() { z } else { most })
 }
 
 /// The body of a result has a face for each outline but so many, and all meet: each edge is passed once in each direction, if none is left. Surfaces reach as
@@ -159,14 +169,7 @@ fn a_circle_bounds_what_is_told() {
     for is_left in [true, false] {
         let result = filled(vec![circle(2.0)], vec![face(&[&[1]], None), face(&[&[1]], Some((BALL, is_left)))]);
         check(&result, 2.0 / 3.0 * PI * 8.0, "half of a ball");
-        let high = result
-            .filled
-            .mesh
-            .points
-            .iter()
-            .map(|point| FRAME.inside(*point)[2])
-            .fold(0.0, |most: f64, z| if z.abs() > most.abs() { z } else { most });
-        assert_eq!(high > 0.0, is_left);
+        assert_eq!(farthest(&result) > 0.0, is_left);
     }
 }
 
@@ -179,14 +182,7 @@ fn a_torus_is_on_the_side_that_is_told() {
         let result = filled(curves.to_vec(), vec![face(ring, None), face(ring, Some((RING, is_left)))]);
         check(&result, PI * PI * 3.0, "half of a torus");
         check_body(&result, &curves, 0);
-        let high = result
-            .filled
-            .mesh
-            .points
-            .iter()
-            .map(|point| FRAME.inside(*point)[2])
-            .fold(0.0, |most: f64, z| if z.abs() > most.abs() { z } else { most });
-        assert_eq!(high > 0.0, is_left);
+        assert_eq!(farthest(&result) > 0.0, is_left);
     }
 }
 
@@ -259,17 +255,10 @@ fn a_loop_bounds_what_is_around_it() {
 /// Without the word of the file, curves alone count.
 #[test]
 fn curves_alone_count_if_that_is_wanted() {
-    let network = |told| Network {
-        unit: Unit { name: "mm".into(), millimetres: 1.0 },
-        resolution: None,
-        digits: 17,
-        curves: vec![curve(circle(2.0))],
-        faces: vec![face(&[&[1]], told)],
-        findings: Vec::new(),
-    };
+    let disc = network(vec![circle(2.0)], vec![face(&[&[1]], Some((BALL, true)))]);
     for (told, method) in [(true, Method::Recognised), (false, Method::Plane)] {
         let options = Options { told, ..Options::default() };
-        let result = fill_network(&network(Some((BALL, true))), (true, &loops::Options::default()), &options).unwrap();
+        let result = fill_network(&disc, (true, &loops::Options::default()), &options).unwrap();
         assert_eq!(result.filled.reports[0].method, method);
     }
 }

@@ -120,7 +120,8 @@ fn inside(cdt: &Cdt, slits: &BTreeSet<[usize; 2]>) -> Vec<bool> {
     depth.into_iter().map(|known| known == Some(true)).collect()
 }
 
-fn shoelace(ring: &[[f64; 2]]) -> f64 {
+/// The area within a ring, positive if that runs anticlockwise.
+pub(super) fn shoelace(ring: &[[f64; 2]]) -> f64 {
     let Some(&[x, y]) = ring.first() else { return 0.0 };
     0.5 * ring.windows(2).map(|pair| (pair[0][0] - x) * (pair[1][1] - y) - (pair[0][1] - y) * (pair[1][0] - x)).sum::<f64>()
 }

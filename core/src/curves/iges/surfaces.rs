@@ -115,7 +115,7 @@ impl Builder<'_> {
         let Shape::Line([from, to]) = self.shape_of(parameters.pointer(1)?, 0)? else {
             return Err("an axis that is no line".into());
         };
-        let axes = about(from, to).ok_or("an axis without a direction")?;
+        let axes = about(from, sub(to, from)).ok_or("an axis without a direction")?;
         let inverse = axes.inverse().ok_or("an axis without a direction")?;
         let profile = self.shape_of(parameters.pointer(2)?, 0)?.transformed(&inverse);
         let exchange = Affine { rows: [[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]], shift: [0.0; 3] };
@@ -152,9 +152,9 @@ fn tensor(parameters: &Parameters) -> Result<Carrier, String> {
     Ok(tensor.into())
 }
 
-/// Axes whose third one goes from a point to another.
-fn about(from: Point, to: Point) -> Option<Affine> {
-    let z = unit(sub(to, from))?;
+/// Axes from a point, the third one along a vector.
+pub(super) fn about(from: Point, along: Point) -> Option<Affine> {
+    let z = unit(along)?;
     let least = |axis: &&Point| z.iter().zip(**axis).map(|(a, b)| (a * b).abs()).sum::<f64>();
     let axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     let away = axes.iter().min_by(|a, b| least(a).total_cmp(&least(b)))?;

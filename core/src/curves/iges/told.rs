@@ -4,10 +4,10 @@ use super::build::Builder;
 use super::directory::Entry;
 use super::parameters::Parameters;
 use super::places::Place;
-use super::surfaces::Carried;
+use super::surfaces::{Carried, about};
 use crate::curves::carrier::Carrier;
 use crate::curves::elementary::Told;
-use crate::curves::vector::{Affine, Point, cross, sub, unit};
+use crate::curves::vector::{Affine, Point, cross, sub};
 
 /// Places of a boundary in the space of parameters, whose area tells its direction.
 const SAMPLES: u32 = 512;
@@ -51,7 +51,7 @@ impl Builder<'_> {
             return Ok(Carrier::Sphere(Affine { shift: origin, ..Affine::IDENTITY }, parameters.real(2)?));
         }
         let along = self.own_point(parameters.pointer(2)?, 123)?;
-        let axes = axes(origin, along).ok_or("an axis without a direction")?;
+        let axes = about(origin, along).ok_or("an axis without a direction")?;
         Ok(match kind {
             190 => Carrier::Plane(axes),
             192 => Carrier::Cylinder(axes, parameters.real(3)?),
@@ -68,12 +68,4 @@ impl Builder<'_> {
         let parameters = self.parameters(&entry).ok_or_else(|| format!("D{number} is damaged"))?;
         parameters.point(1)
     }
-}
-
-/// Axes with a third one along a direction.
-fn axes(origin: Point, along: Point) -> Option<Affine> {
-    let z = unit(along)?;
-    let away = if z[0].abs() < 0.6 { [1.0, 0.0, 0.0] } else { [0.0, 1.0, 0.0] };
-    let x = unit(cross(away, z))?;
-    Some(Affine::from_axes([x, cross(z, x), z], origin))
 }

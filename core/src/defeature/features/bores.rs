@@ -27,7 +27,7 @@ const MOST_SEGMENTS: usize = 64;
 pub(super) fn find(mesh: &Mesh, segments: &Segments, limits: &Limits, known: &[Candidate]) -> Vec<Candidate> {
     let Some(limit) = limits.holes_below else { return Vec::new() };
     let mut is_known = vec![false; mesh.triangles.len()];
-    known.iter().flat_map(|c| &c.triangles).for_each(|t| is_known[*t as usize] = true);
+    known.iter().flat_map(|c| &c.entry.triangles).for_each(|t| is_known[*t as usize] = true);
     let mut found = Vec::new();
     for (number, segment) in segments.list.iter().enumerate() {
         let Surface::Cylinder { origin, axis, radius } = segment.surface else { continue };
@@ -55,8 +55,8 @@ pub(super) fn find(mesh: &Mesh, segments: &Segments, limits: &Limits, known: &[C
         let is_open = gap > ALL_ROUND || !ends_in_ridges(mesh, segments, &ends);
         let hole = if is_open { None } else { classify(mesh, segments, triangles.clone()) };
         let told = Told::new(mesh, segments, segment, &numbers);
-        found.push(match hole.filter(|c| c.kind.is_hole()) {
-            Some(hole) => told.of((hole.kind, hole.size, hole.confidence), triangles, hole.loops),
+        found.push(match hole.filter(|c| c.entry.kind.is_hole()) {
+            Some(hole) => told.of((hole.entry.kind, hole.entry.size, hole.confidence), triangles, hole.loops),
             None => {
                 let kind = if told.has_end { Kind::BlindHole } else { Kind::ThroughHole };
                 let sure = patch::confidence(mesh, segments, &numbers);
@@ -116,7 +116,7 @@ fn ends_in_ridges(mesh: &Mesh, segments: &Segments, rims: &[Vec<u32>]) -> bool {
     ridge >= LEAST_RIDGE * all
 }
 
-/// What is told of a hole by its wall.
+/// A hole as its wall tells it.
 struct Told {
     wall: Entry,
     /// Whether a flat, a cone's tip or a sphere closes it.

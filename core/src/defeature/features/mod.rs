@@ -23,12 +23,12 @@ pub(crate) fn find(mesh: &Mesh, segments: &Segments, limits: &Limits) -> Vec<Can
     let pieces = inner::pieces(mesh, segments, limits.holes_below);
     let mut found: Vec<Candidate> = pieces.into_iter().filter_map(|piece| patch::classify(mesh, segments, piece)).collect();
     // A bore whose head is too wide to go is none by itself.
-    found.retain(|candidate| candidate.kind.is_hole() || limits.takes(candidate.kind, candidate.size));
+    found.retain(|candidate| candidate.entry.kind.is_hole() || limits.takes(candidate.entry.kind, candidate.entry.size));
     found.extend(bores::find(mesh, segments, limits, &found));
     found.extend(channels::find(mesh, segments, limits));
     found.extend(blends::find(mesh, segments, limits));
     // What is as small as rounding is none.
     let least = 16.0 * mesh.flatness();
-    found.retain(|candidate| candidate.size > least && limits.takes(candidate.kind, candidate.size));
+    found.retain(|candidate| candidate.entry.size > least && limits.takes(candidate.entry.kind, candidate.entry.size));
     found
 }

@@ -20,24 +20,19 @@ pub(super) const COS_SMOOTH: f64 = 0.9945;
 
 /// A patch that may be a feature.
 pub(crate) struct Candidate {
-    pub(crate) kind: Kind,
-    pub(crate) centre: Point,
-    pub(crate) axis: Point,
-    pub(crate) size: f64,
-    pub(crate) length: f64,
-    pub(crate) depth: f64,
+    /// Its kind, place, sizes and triangles.
+    pub(crate) entry: Entry,
     pub(crate) confidence: f64,
-    pub(crate) triangles: Vec<u32>,
     pub(crate) loops: Vec<Vec<u32>>,
     /// Strips between two faces, for fillets and chamfers; none for what lies on carriers by itself.
     pub(crate) strips: Vec<Strip>,
-    /// What goes with it and is told of by itself: fillets of other radii, bores that cross.
+    /// Features that go with it and are told by themselves: fillets of other radii, bores that cross.
     pub(crate) kin: Vec<Entry>,
     /// Why it is not removed, if that is known before a removal is planned.
     pub(crate) barred: Option<Reason>,
 }
 
-/// What is told of a feature.
+/// Kind, place, sizes and triangles of a feature, as it is told.
 #[derive(Clone, Debug)]
 pub(crate) struct Entry {
     pub(crate) kind: Kind,
@@ -52,9 +47,7 @@ pub(crate) struct Entry {
 impl Candidate {
     /// A candidate without strips.
     pub(super) fn new(entry: Entry, confidence: f64, loops: Vec<Vec<u32>>) -> Self {
-        let Entry { kind, centre, axis, size, length, depth, triangles } = entry;
-        let (strips, kin, barred) = (Vec::new(), Vec::new(), None);
-        Self { kind, centre, axis, size, length, depth, confidence, triangles, loops, strips, kin, barred }
+        Self { entry, confidence, loops, strips: Vec::new(), kin: Vec::new(), barred: None }
     }
 }
 
@@ -115,8 +108,8 @@ pub(super) fn classify(mesh: &Mesh, segments: &Segments, triangles: Vec<u32>) ->
 
 /// Bores that cross, in place of the hole that all of them are.
 fn apart(hole: Candidate, mut bores: Vec<Entry>) -> Candidate {
-    let Entry { centre, axis, size, length, depth, .. } = bores.remove(0);
-    Candidate { centre, axis, size, length, depth, kin: bores, ..hole }
+    let Entry { kind, triangles, .. } = hole.entry;
+    Candidate { entry: Entry { kind, triangles, ..bores.remove(0) }, kin: bores, ..hole }
 }
 
 /// The kind of a depression.

@@ -83,8 +83,8 @@ pub(crate) fn changes(mesh: &Mesh, edit: &Edit, candidate: &Candidate) -> Result
         triangles.map(|t| six_volumes(t.map(|v| sub(at(v), origin)))).sum()
     };
     let gain = sum(&mut edit.triangles.iter().copied()) - sum(&mut edit.removed.iter().map(|t| mesh.triangles[*t as usize]));
-    let area: f64 = candidate.triangles.iter().map(|t| mesh.areas[*t as usize]).sum();
-    let change = match candidate.kind {
+    let area: f64 = candidate.entry.triangles.iter().map(|t| mesh.areas[*t as usize]).sum();
+    let change = match candidate.entry.kind {
         Kind::Fillet | Kind::Chamfer => gain.abs(),
         Kind::Boss => -gain,
         _ => gain,

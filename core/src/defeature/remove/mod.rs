@@ -56,7 +56,7 @@ fn checked(mesh: &Mesh, segments: &Segments, candidate: &Candidate, star: &Star,
 }
 
 fn planned(mesh: &Mesh, segments: &Segments, candidate: &Candidate, trial: &Trial) -> Result<Edit, Reason> {
-    let reach = 2.0 * extent(mesh, &candidate.triangles);
+    let reach = 2.0 * extent(mesh, &candidate.entry.triangles);
     if !candidate.strips.is_empty() {
         return network::plan(mesh, segments, candidate, reach, trial);
     }
@@ -65,5 +65,5 @@ fn planned(mesh: &Mesh, segments: &Segments, candidate: &Candidate, trial: &Tria
         let runs = plan.follow(rim)?;
         plan.close(runs)?;
     }
-    plan.finish(&candidate.triangles, trial)
+    plan.finish(&candidate.entry.triangles, trial)
 }

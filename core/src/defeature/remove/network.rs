@@ -41,7 +41,7 @@ pub(crate) fn plan(mesh: &Mesh, segments: &Segments, candidate: &Candidate, reac
         let way = way(mesh, &mut plan, &strip.rims, [one, other], ends)?;
         plan.along(one, other, &way);
     }
-    plan.finish(&candidate.triangles, trial)
+    plan.finish(&candidate.entry.triangles, trial)
 }
 
 /// Ends that share vertices, directly or over corner pieces.
@@ -53,7 +53,7 @@ fn joints(mesh: &Mesh, segments: &Segments, candidate: &Candidate) -> Joints {
     // Each vertex of an end, and each corner piece across it, belongs to the joint.
     let mut by_key: BTreeMap<(bool, u32), usize> = BTreeMap::new();
     let mut join = |key: (bool, u32), end: usize| sets.join(*by_key.entry(key).or_insert(end) as u32, end as u32);
-    let inside = |t: u32| candidate.triangles.binary_search(&t).is_ok();
+    let inside = |t: u32| candidate.entry.triangles.binary_search(&t).is_ok();
     for (number, strip) in candidate.strips.iter().enumerate() {
         for side in 0..2 {
             for half in &strip.ends[side] {
@@ -101,7 +101,7 @@ fn corners(
                 members[joints.of[2 * number + side]].1.push(point);
                 members[joints.of[2 * number + side]].1.push(mesh.at(mesh.to(*half)));
                 let across = mesh.across(*half);
-                if candidate.triangles.binary_search(&across).is_err() {
+                if candidate.entry.triangles.binary_search(&across).is_err() {
                     let carrier = plan.carrier(segments.of[across as usize], point)?;
                     members[joints.of[2 * number + side]].0.push(carrier);
                 }

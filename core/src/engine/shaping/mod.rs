@@ -77,7 +77,7 @@ impl Step {
         match self {
             Self::Features(_) => 1 << 10,
             Self::Residue => 512,
-            Self::Smooth | Self::Simplify => 320,
+            Self::Smooth | Self::Simplify => simplifying::BYTES_A_TRIANGLE,
         }
     }
 

@@ -7,6 +7,9 @@ use crate::engine::mesh::Mesh;
 use crate::engine::work::Work;
 use crate::simplify::{self, Ended, Input, Options};
 
+/// Memory for each triangle of a mesh that is simplified or smoothed.
+pub(super) const BYTES_A_TRIANGLE: u64 = 320;
+
 /// How many triangles a profile wants of so many.
 pub(super) fn wanted(profile: &Profile, triangles: usize) -> Option<usize> {
     let count = (profile.simplify_triangles > 0).then(|| usize::try_from(profile.simplify_triangles).unwrap_or(usize::MAX));

@@ -8,6 +8,7 @@ use crate::curves::export::EdgeUse;
 use super::super::chart::{Chart, Turned};
 use super::super::options::Outline;
 use super::super::side;
+use super::super::triangles::shoelace;
 use super::edges::{Edges, turn};
 use super::lift::{Lifted, coordinates, growth, lift, near};
 use crate::curves::elementary::Elementary;
@@ -27,11 +28,9 @@ fn around(lifted: &[Vec<Lifted>]) -> Option<(usize, usize)> {
     }
 }
 
-/// Twice the area within a loop in coordinates, by samples.
+/// The area within a loop in coordinates, by samples.
 fn area(ring: &[Lifted]) -> f64 {
-    let places: Vec<[f64; 2]> = ring.iter().flat_map(|one| one.samples.iter().map(|(_, place)| *place)).collect();
-    let pairs = places.iter().zip(places.iter().cycle().skip(1));
-    pairs.map(|([a, b], [c, d])| a * d - b * c).sum()
+    shoelace(&ring.iter().flat_map(|one| one.samples.iter().map(|(_, place)| *place)).collect::<Vec<_>>())
 }
 
 /// Cuts the second loop around a surface where a seam from the beginning of the first one comes to it.

@@ -48,7 +48,7 @@ const WHOLE: Turn = Turn { shift: 0.0, share: 1.0, margin: 1.0 };
 pub(super) struct Sizes {
     /// A cell, about.
     cell: u32,
-    /// What is left is one cell from this count on.
+    /// All that is left is one cell from this count on.
     whole: usize,
 }
 
@@ -83,7 +83,7 @@ struct Course<'a> {
     wanted: Option<usize>,
     /// The largest deviation that may be.
     most: f64,
-    /// What the last pass left: new triangles, then those of the input.
+    /// Triangles that the last pass left: new triangles, then those of the input.
     spool: Option<Spooled>,
     /// Triangles of the input that are still there, a bit each, and how many they are.
     stays: Vec<u64>,

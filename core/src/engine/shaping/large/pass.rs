@@ -5,6 +5,7 @@ use std::path::Path;
 
 use rayon::prelude::*;
 
+use super::super::simplifying::BYTES_A_TRIANGLE;
 use super::cell::{Cell, Made};
 use crate::contract::error::{Error, Result as Failing};
 use crate::engine::nameless_stl::{self, Spooled};
@@ -15,9 +16,6 @@ use crate::simplify::{Ended, Options};
 use crate::stream::members::{Members, Reads};
 use crate::stream::plan::{ChunkId, Plan};
 use crate::util::{bits, parallel};
-
-/// Memory for each triangle that a cell sees while it is simplified.
-const BYTES_A_TRIANGLE: u64 = 320;
 
 /// So many cells for each thread at a time: some are done sooner than others.
 const CELLS_A_THREAD: usize = 2;
@@ -38,7 +36,7 @@ impl From<Error> for Stop {
     }
 }
 
-/// What is to be done.
+/// A pass that is to be made.
 pub(super) struct Pass<'a> {
     pub(super) path: &'a Path,
     pub(super) records: &'a [Record],
@@ -57,7 +55,7 @@ pub(super) struct Pass<'a> {
     pub(super) work: Work<'a>,
 }
 
-/// What was done.
+/// A pass that was made.
 pub(super) struct Passed {
     /// New triangles, by cells, then those that stay, in their order.
     pub(super) spool: Spooled,

@@ -18,6 +18,10 @@ pub struct Residue {
     pub triangles_before: u64,
     /// Triangles in their places.
     pub triangles_after: u64,
+    /// Of the vertices that the tool reaches, the share that lies where it left the material, from 0 to 1: of a mesh that this path has cut, all do; 0 if it
+    /// reaches none. `None` without a path.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub path_fit: Option<f64>,
     /// Oddities of the tool path, with their lines (at most 20).
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub findings: Vec<String>,

@@ -1,7 +1,7 @@
 //! The search for residue: vertices judged, triangles marked, regions described.
 
 use super::cuts::{Family, families};
-use super::found::{Found, Kind, Mesh, RegionReport};
+use super::found::{Fit, Found, Kind, Mesh, RegionReport};
 use super::intended::{Limits, Scratch, Verdict, judge};
 use super::options::{Corrections, Error, Options};
 use super::regions::{clean, neighbours, pieces};
@@ -67,26 +67,20 @@ pub fn find(mesh: Mesh<'_>, moves: &Moves, tools: &[Tool], options: &Options<'_>
     }
     let limits: Vec<Limits> = families.iter().map(|family| limits(mesh, family, options)).collect();
     let mut marks = vec![Mark::OUT; mesh.points.len()];
-    let is_done = mesh
+    let fit = mesh
         .points
         .par_chunks(BLOCK)
         .zip(marks.par_chunks_mut(BLOCK))
         .map_init(Scratch::default, |lent, (points, marks)| {
-            let is_wanted = (options.go_on)();
-            if is_wanted {
-                block(points, &families, &limits, (marks, lent));
-            }
-            is_wanted
+            (options.go_on)().then(|| block(points, &families, &limits, (marks, lent)))
         })
-        .reduce(|| true, |a, b| a && b);
-    if !is_done {
-        return Err(Error::Stopped);
-    }
+        .try_reduce(Fit::default, |a, b| Some(a.and(b)));
+    let fit = fit.ok_or(Error::Stopped)?;
     drop(families);
     let height_min = options
         .height_min
         .unwrap_or_else(|| limits.iter().map(|limits| HEIGHT_LEAST * limits.tolerance).fold(f64::INFINITY, f64::min));
-    regions(mesh, marks, height_min, options)
+    regions(mesh, (marks, fit), height_min, options)
 }
 
 pub(super) fn check(mesh: Mesh<'_>, options: &Options<'_>) -> Result<(), Error> {
@@ -112,15 +106,21 @@ fn limits(mesh: Mesh<'_>, family: &Family<'_>, options: &Options<'_>) -> Limits 
 }
 
 /// Judges a block of vertices; each begins with the cut that the one before it found.
-fn block(points: &[[f32; 3]], families: &[Family<'_>], limits: &[Limits], (marks, lent): (&mut [Mark], &mut Scratch)) {
-    let mut starts = vec![None; families.len()];
+fn block(points: &[[f32; 3]], families: &[Family<'_>], limits: &[Limits], (marks, lent): (&mut [Mark], &mut Scratch)) -> Fit {
+    let (mut starts, mut fit) = (vec![None; families.len()], Fit::default());
     for (point, mark) in points.iter().zip(marks) {
-        *mark = vertex(point.map(f64::from), families, limits, &mut starts, lent);
+        *mark = vertex(point.map(f64::from), families, limits, (&mut starts, lent, &mut fit));
     }
+    fit
 }
 
 /// Judges a vertex by the cut nearest to it, or by the nearest one in another direction: short moves that join passes cut there too.
-fn vertex(point: Point, families: &[Family<'_>], limits: &[Limits], starts: &mut [Option<u32>], lent: &mut Scratch) -> Mark {
+fn vertex(
+    point: Point,
+    families: &[Family<'_>],
+    limits: &[Limits],
+    (starts, lent, fit): (&mut [Option<u32>], &mut Scratch, &mut Fit),
+) -> Mark {
     let mut best = None;
     for (number, ((family, limits), start)) in families.iter().zip(limits).zip(starts.iter_mut()).enumerate() {
         let most = limits.tolerance + 0.5 * limits.height_max;
@@ -133,8 +133,10 @@ fn vertex(point: Point, families: &[Family<'_>], limits: &[Limits], starts: &mut
     let Some((number, distance, touch)) = best else { return Mark::OUT };
     let (Some(family), Some(limits)) = (families.get(number), limits.get(number)) else { return Mark::OUT };
     if distance < -limits.tolerance {
+        fit.uncut += 1;
         return Mark::OUT;
     }
+    fit.touched += usize::from(distance <= limits.tolerance);
     if let Some(verdict) = judge(family, point, touch, *limits, lent) {
         return Mark::new(&verdict);
     }
@@ -145,7 +147,7 @@ fn vertex(point: Point, families: &[Family<'_>], limits: &[Limits], starts: &mut
 }
 
 /// Marks triangles, cleans up and describes regions.
-fn regions(mesh: Mesh<'_>, marks: Vec<Mark>, height_min: f64, options: &Options<'_>) -> Result<Found, Error> {
+fn regions(mesh: Mesh<'_>, (marks, fit): (Vec<Mark>, Fit), height_min: f64, options: &Options<'_>) -> Result<Found, Error> {
     let of = |face: &[u32; 3]| face.map(|vertex| marks.get(vertex as usize).copied().unwrap_or(Mark::OUT));
     let mut is_in: Vec<bool> = mesh.faces.par_iter().map(|face| of(face).iter().map(Mark::weight).sum::<u8>() > 3).collect();
     let neighbours = neighbours(mesh.points.len(), mesh.faces);
@@ -175,7 +177,7 @@ fn regions(mesh: Mesh<'_>, marks: Vec<Mark>, height_min: f64, options: &Options<
         reports.push(report);
     }
     let targets = marks.iter().map(|mark| if mark.is_known() { mark.target } else { [f32::NAN; 3] }).collect();
-    Ok(Found { labels, targets, regions: reports })
+    Ok(Found { labels, targets, regions: reports, fit })
 }
 
 /// For each triangle, whether corrections let it be residue's.

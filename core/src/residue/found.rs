@@ -47,6 +47,33 @@ pub struct RegionReport {
     pub triangles: usize,
 }
 
+/// How well the tool path fits the mesh: a mesh that was cut along the path has no vertex within what the tool swept.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Fit {
+    /// Vertices on the boundary of the swept volume, within the tolerance.
+    pub touched: usize,
+    /// Vertices within the swept volume: the tool should have cut them away.
+    pub uncut: usize,
+}
+
+impl Fit {
+    pub(super) fn and(self, other: Self) -> Self {
+        Self { touched: self.touched + other.touched, uncut: self.uncut + other.uncut }
+    }
+
+    /// How many vertices the tool reaches.
+    #[must_use]
+    pub fn reached(self) -> usize {
+        self.touched + self.uncut
+    }
+
+    /// Of the vertices that the tool reaches, the share that lies where it left the material; 0 if it reaches none.
+    #[must_use]
+    pub fn share(self) -> f64 {
+        self.touched as f64 / self.reached().max(1) as f64
+    }
+}
+
 /// Residue that was found.
 #[derive(Clone, Debug)]
 pub struct Found {
@@ -56,4 +83,6 @@ pub struct Found {
     pub targets: Vec<[f32; 3]>,
     /// Regions, in the order of their first triangles.
     pub regions: Vec<RegionReport>,
+    /// How well the path fits the mesh.
+    pub fit: Fit,
 }

@@ -28,7 +28,7 @@ mod tests;
 
 pub use brush::{Brush, BrushError};
 pub use find::find;
-pub use found::{Found, Kind, Mesh, RegionReport};
+pub use found::{Fit, Found, Kind, Mesh, RegionReport};
 pub use options::{Corrections, Error, Options, Region};
 pub use repair::{Repaired, repair};
 pub use spectrum::{Hint, hint};

@@ -7,7 +7,7 @@ use super::corrections::{self, FromFiles, Origins};
 use crate::contract::report::{MOST_LISTED, Outcome, Report, Residue, ResidueRegion, ResidueSuspect};
 use crate::engine::mesh::Mesh;
 use crate::engine::work::Work;
-use crate::residue::{self, Corrections, Found, Kind, Repaired};
+use crate::residue::{self, Corrections, Fit, Found, Kind, Repaired};
 use crate::simplify::{self, Input, Options};
 use crate::smooth;
 use crate::toolpath::{self, Program, Tool, project, tools};
@@ -17,6 +17,10 @@ use crate::util::words::Counted;
 const SHARE: f64 = 0.2;
 /// Of the lowest region's height, the simplified surface may be so far from the moved one.
 const OFF: f64 = 0.5;
+/// The least share of vertices where the tool left the material ([`Fit::share`]) with which a path counts as the mesh's own.
+const FIT_LEAST: f64 = 0.5;
+/// The share below which a person has to look.
+const FIT_GOOD: f64 = 0.9;
 /// Oddities of a path that are listed.
 const FINDINGS: usize = 20;
 
@@ -64,7 +68,27 @@ pub(super) fn put(told: Residue, report: &mut Report) {
             }
         });
     }
+    if let Some(share) = told.path_fit.filter(|share| *share < FIT_GOOD && report.verdict.good) {
+        report.outcome = Outcome::NeedsReview;
+        let share = format!("{:.0} % of the vertices that the tool reaches lie where it left the material", 100.0 * share);
+        report.verdict.reasons.push(format!("the tool path does not fit the mesh: {share}"));
+    }
     report.residue = Some(told);
+}
+
+/// Why the path is not believed to have cut this mesh.
+fn misfit(fit: Fit) -> Option<String> {
+    if fit.reached() == 0 {
+        return Some("the tool reaches no vertex of the mesh: the path's origin, unit or axes may be others".into());
+    }
+    (fit.share() < FIT_LEAST).then(|| {
+        let reached = Counted(fit.reached() as u64, "vertex", "vertices");
+        format!(
+            "of {reached} that the tool reaches, {:.0} % lie where it left the material: the path may be another part's, its origin, unit or axes may be others, \
+             or the simulation is coarser than the tolerance",
+            100.0 * fit.share()
+        )
+    })
 }
 
 /// The mesh without residue, by the path.
@@ -74,6 +98,10 @@ fn removed(mesh: &Mesh, options: &residue::Options<'_>, work: Work<'_>) -> Resul
     let view = residue::Mesh { points: mesh.vertices(), faces: mesh.faces() };
     let named = |error: residue::Error| format!("{}: {error}", settings.toolpath);
     let found = residue::find(view, &program.moves, &program.header.tools, options).map_err(named)?;
+    if let Some(why_not) = misfit(found.fit) {
+        let told = Residue { why_not: Some(why_not), path_fit: Some(found.fit.share()), ..Residue::default() };
+        return Ok(Change { gone: Vec::new(), added: Vec::new(), told: Told::Residue(told) });
+    }
     let repaired = residue::repair(view, &found, options).map_err(named)?;
     let mut told = told(&found, &program);
     if told.triangles_before == 0 {
@@ -157,6 +185,7 @@ fn told(found: &Found, program: &Program) -> Residue {
     Residue {
         regions: found.regions.iter().take(MOST_LISTED).map(region).collect(),
         triangles_before: found.labels.iter().filter(|label| **label != u32::MAX).count() as u64,
+        path_fit: Some(found.fit.share()),
         findings: findings.map(|finding| format!("line {}: {}", finding.line, finding.text)).collect(),
         ..Residue::default()
     }

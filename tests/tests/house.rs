@@ -168,6 +168,21 @@ fn no_file_and_no_function_is_too_long() {
     assert!(long.is_empty(), "{long:#?}");
 }
 
+/// Bytes of a file of the repository, at most: what is larger was made or fetched, and taken in by mistake.
+const LARGEST: u64 = 1 << 20;
+
+#[test]
+fn no_file_of_the_repository_is_large() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let listed = std::process::Command::new("git").arg("-C").arg(&root).args(["ls-files", "-z"]).output();
+    // A copy without its history has only what was packed into it.
+    let Some(listed) = listed.ok().filter(|listed| listed.status.success()) else { return };
+    let names = String::from_utf8(listed.stdout).expect("names in UTF-8");
+    let size = |name: &str| std::fs::metadata(root.join(name)).map_or(0, |data| data.len());
+    let large: Vec<&str> = names.split('\0').filter(|name| !name.is_empty() && size(name) > LARGEST).collect();
+    assert!(large.is_empty(), "{large:?}");
+}
+
 /// Faults without a test, and why there is none.
 const WITHOUT: [(u32, &str); 0] = [];
 

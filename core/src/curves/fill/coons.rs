@@ -8,6 +8,7 @@ use super::spline::SplineSurface;
 use super::sum::sum;
 use crate::curves::curve::{CurveError, Spline};
 use crate::curves::vector::{Point, add, cross, dot, norm, scale, sub};
+use crate::util::each::Each;
 
 /// Control points of a surface, at most.
 const MOST: usize = 1 << 22;
@@ -105,8 +106,8 @@ impl Coons {
         if let Some(base) = &self.base {
             return base.sum([u, v], base.rest.point_and_derivatives([u, v]));
         }
-        let along = [&self.along[0], &self.along[1]].map(|side| side.point_and_derivative(u));
-        let across = [&self.across[0], &self.across[1]].map(|side| side.point_and_derivative(v));
+        let along = [&self.along[0], &self.along[1]].each(|side| side.point_and_derivative(u));
+        let across = [&self.across[0], &self.across[1]].each(|side| side.point_and_derivative(v));
         self.blended([u, v], along, across)
     }
 
@@ -159,12 +160,12 @@ impl Coons {
         if let Some(base) = &self.base {
             return base.to_spline();
         }
-        let [u, v] = [&self.along, &self.across].map(|[a, b]| basis::union(a.knots(), b.knots()));
+        let [u, v] = [&self.along, &self.across].each(|[a, b]| basis::union(a.knots(), b.knots()));
         if u.len().saturating_mul(v.len()) > MOST {
             return Err(CurveError::Degenerate("a surface of more than 4,194,304 control points"));
         }
-        let [bottom, top] = [&self.along[0], &self.along[1]].map(|side| basis::refined(3, side.knots(), side.points(), &u));
-        let [left, right] = [&self.across[0], &self.across[1]].map(|side| basis::refined(3, side.knots(), side.points(), &v));
+        let [bottom, top] = [&self.along[0], &self.along[1]].each(|side| basis::refined(3, side.knots(), side.points(), &u));
+        let [left, right] = [&self.across[0], &self.across[1]].each(|side| basis::refined(3, side.knots(), side.points(), &v));
         let (means, heights) = (basis::greville(3, &u), basis::greville(3, &v));
         let [p, q, s, e] = self.corners;
         let mix = |a: Point, b: Point, t: f64| add(scale(a, 1.0 - t), scale(b, t));

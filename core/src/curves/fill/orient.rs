@@ -2,6 +2,7 @@
 
 use super::mesh::Mesh;
 use crate::curves::vector::{cross, dot, sub};
+use crate::util::each::Each;
 
 /// An edge between two outlines, and whether both run along it in the same direction.
 type Link = (u32, u32, bool);
@@ -49,7 +50,7 @@ pub(super) fn flipped(mesh: &Mesh, outlines: usize, is_void: impl Fn(usize) -> b
 fn links(mesh: &Mesh) -> (Vec<Link>, Vec<u32>) {
     let mut halves = Vec::with_capacity(3 * mesh.triangles.len());
     for (&[a, b, c], &face) in mesh.triangles.iter().zip(&mesh.face_of) {
-        halves.extend([(a, b), (b, c), (c, a)].map(|(a, b)| (a.min(b), a.max(b), face, a < b)));
+        halves.extend([(a, b), (b, c), (c, a)].each(|(a, b)| (a.min(b), a.max(b), face, a < b)));
     }
     halves.sort_unstable();
     let (mut links, mut open) = (Vec::new(), Vec::new());
@@ -71,7 +72,7 @@ fn volumes(mesh: &Mesh, flips: &[bool], component: &[u32]) -> Vec<f64> {
     let mut volumes = vec![0.0; flips.len()];
     let origin = mesh.points.first().copied().unwrap_or_default();
     for (triangle, face) in mesh.triangles.iter().zip(&mesh.face_of) {
-        let [a, b, c] = triangle.map(|number| sub(mesh.points.get(number as usize).copied().unwrap_or(origin), origin));
+        let [a, b, c] = triangle.each(|number| sub(mesh.points.get(number as usize).copied().unwrap_or(origin), origin));
         let sign = if flips.get(*face as usize) == Some(&true) { -1.0 } else { 1.0 };
         let at = component.get(*face as usize).copied().unwrap_or_default() as usize;
         volumes.iter_mut().skip(at).take(1).for_each(|volume| *volume += sign * dot(a, cross(b, c)));

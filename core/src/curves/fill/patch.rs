@@ -21,6 +21,7 @@ use super::unrolled;
 use crate::curves::Use;
 use crate::curves::elementary::Elementary;
 use crate::curves::vector::{Point, distance, dot, scale};
+use crate::util::each::Each;
 
 /// Gaps between curves count as inaccuracy of these up to this share of the size.
 const GAP: f64 = 3e-5;
@@ -352,7 +353,7 @@ impl<'a> Task<'a> {
             let within = || Corner::Inner(first + number - corners.len() as u32);
             corners.get(number as usize).copied().unwrap_or_else(within)
         };
-        let triangles = improved.lifted.flat.triangles.iter().map(|triangle| triangle.map(corner)).collect();
+        let triangles = improved.lifted.flat.triangles.iter().map(|triangle| triangle.each(corner)).collect();
         let points = added.iter().chain(improved.lifted.points.get(corners.len()..).unwrap_or_default()).copied().collect();
         Some(Meshed { points, triangles, longest, poor, wishes, is_cut: false, turns_back })
     }

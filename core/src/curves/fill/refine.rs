@@ -12,6 +12,7 @@ use std::collections::{BinaryHeap, VecDeque};
 
 use super::lifted::{End, Lifted, NONE};
 use crate::curves::vector::{Point, cross, distance, dot, norm, sub};
+use crate::util::each::Each;
 
 /// Twice the ratio of radii below which a triangle is divided: that of angles of 30°, 30° and 120° is 0.4641.
 const GOOD: f64 = 0.46;
@@ -110,9 +111,9 @@ struct Shape {
 
 impl Shape {
     fn of(lifted: &Lifted<'_>, triangle: u32) -> Self {
-        let [a, b, c] = lifted.corners(triangle).map(|corner| lifted.point(corner));
+        let [a, b, c] = lifted.corners(triangle).each(|corner| lifted.point(corner));
         let (u, v, w) = (sub(c, b), sub(a, c), sub(b, a));
-        let lengths = [u, v, w].map(|side| dot(side, side).sqrt());
+        let lengths = [u, v, w].each(|side| dot(side, side).sqrt());
         let double = norm(cross(v, w));
         let [x, y, z] = lengths;
         let (product, around) = (x * y * z, x + y + z);
@@ -134,15 +135,15 @@ impl Shape {
 /// The place at a height above the middle of an edge, on the map, as the edge's triangle is laid there.
 fn above(lifted: &Lifted<'_>, edge: u32, height: f64) -> Option<[f64; 2]> {
     let corners = lifted.around(edge);
-    let [c, a, b] = corners.map(|corner| lifted.point(corner));
+    let [c, a, b] = corners.each(|corner| lifted.point(corner));
     let (along, up) = (sub(b, a), sub(c, a));
     let squared = dot(along, along);
     let foot = dot(up, along) / squared;
     let high = norm(cross(along, up)) / squared.sqrt();
     let third = height / high;
     let second = 0.5 - third * foot;
-    let [p, q, r] = corners.map(|corner| lifted.place(corner));
-    let place = [0, 1].map(|axis| p[axis] * third + q[axis] * (1.0 - second - third) + r[axis] * second);
+    let [p, q, r] = corners.each(|corner| lifted.place(corner));
+    let place = [0, 1].each(|axis| p[axis] * third + q[axis] * (1.0 - second - third) + r[axis] * second);
     place.iter().all(|x| x.is_finite()).then_some(place)
 }
 
@@ -232,7 +233,7 @@ impl State<'_, '_> {
 }
 
 fn length(lifted: &Lifted<'_>, edge: u32) -> f64 {
-    let [_, a, b] = lifted.around(edge).map(|corner| lifted.point(corner));
+    let [_, a, b] = lifted.around(edge).each(|corner| lifted.point(corner));
     distance(a, b)
 }
 
@@ -243,7 +244,7 @@ fn settled(lifted: &Lifted<'_>, from: u32, mut place: [f64; 2], mut clear: f64) 
     let mut point = lifted.lift(place);
     let low = |triangle: u32, point: Point, least: f64| {
         (3 * triangle..3 * triangle + 3).find(|edge| {
-            let [_, a, b] = lifted.around(*edge).map(|corner| lifted.point(corner));
+            let [_, a, b] = lifted.around(*edge).each(|corner| lifted.point(corner));
             lifted.beyond(*edge) == NONE && norm(cross(sub(b, a), sub(point, a))) < least * dot(sub(b, a), sub(b, a))
         })
     };

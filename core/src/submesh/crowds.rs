@@ -24,7 +24,8 @@ pub(crate) struct Member {
 /// Vertices that are all within the reach of each other; often only one.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Crowd {
-    first: u32,
+    /// The place of its first member among all.
+    pub(crate) first: u32,
     pub(crate) count: u32,
     /// Of its vertices.
     pub(crate) bounds: Bounds,
@@ -59,6 +60,9 @@ impl Crowds {
             crowds.add(submesh, first, together.len());
             first += together.len();
         }
+        // In the order of the vertices again, not in that of the hashes: what one crowd has around it the next one meets in the cache.
+        let Self { members, all } = &mut crowds;
+        sort_by_number(all, |crowd| members[crowd.first as usize].vertex);
         crowds
     }
 

@@ -35,14 +35,14 @@ pub(crate) fn close_pairs(submesh: &Submesh, edges: &Edges, tolerance: &Toleranc
     }
     let crowds = Crowds::of(submesh, &vertices, |v| tolerance.at(submesh, v), threads);
     let tree = BoxTree::new(&crowds.all.iter().map(|crowd| crowd.bounds).collect::<Vec<_>>());
-    let mut pairs = parallel::gather(threads, &crowds.all, |met, (i, crowd), pairs| {
+    let mut pairs = parallel::gather(threads, &crowds.all, |met, (_, crowd), pairs| {
         pairs.extend(crowds.members(&crowd).windows(2).map(|two| (two[0].vertex, two[1].vertex)));
         tree.meeting(&wider(&crowd.bounds, crowd.most), met);
         steps::count(met.len() + crowd.count as usize);
         // Of two crowds, the one that reaches less far looks for the other.
-        let others = met.iter().map(|j| (*j as usize, &crowds.all[*j as usize]));
-        let others = others.filter(|(j, other)| (crowd.least, i) < (other.least, *j));
-        pairs.extend(others.filter_map(|(_, other)| crowds.pair_of(submesh, &crowd, other)));
+        let others = met.iter().map(|j| &crowds.all[*j as usize]);
+        let others = others.filter(|other| (crowd.least, crowd.first) < (other.least, other.first));
+        pairs.extend(others.filter_map(|other| crowds.pair_of(submesh, &crowd, other)));
     });
     pairs.sort_unstable();
     pairs

@@ -8,7 +8,7 @@ use super::plate::Plate;
 use crate::curves::curve::Spline;
 use crate::curves::elementary::Elementary;
 use crate::curves::elementary::Frame;
-use crate::curves::vector::{Point, add, between, dot, norm, scale};
+use crate::curves::vector::{Point, add, between, dot, norm, plain_norm, scale};
 use crate::util::each::Each;
 
 /// A flat map of a surface.
@@ -236,14 +236,14 @@ fn sagging(coons: &Coons, form: Form, chord: f64) -> f64 {
             [get(i + 1, j - 1), get(i - 1, j + 1)],
         ];
         for [a, b] in lines {
-            let sag = norm(add(scale(add(a, b), 0.5), scale(middle, -1.0)));
+            let sag = plain_norm(add(scale(add(a, b), 0.5), scale(middle, -1.0)));
             let across = add(b, scale(a, -1.0));
             if sag > 0.0 {
                 longest = longest.min((dot(across, across) * chord / sag).sqrt());
             }
         }
     }
-    let sum = |[a, b]: [Point; 2]| norm(add(b, scale(a, -1.0)));
+    let sum = |[a, b]: [Point; 2]| plain_norm(add(b, scale(a, -1.0)));
     let last = 2 * CELLS as usize;
     let around = [[(0, 0), (last, 0)], [(last, 0), (last, last)], [(last, last), (0, last)], [(0, last), (0, 0)]];
     let mean = around.iter().map(|pair| sum(pair.each(|(i, j)| get(i, j)))).sum::<f64>() / 4.0;

@@ -7,7 +7,7 @@ use super::basis;
 use super::spline::SplineSurface;
 use super::sum::sum;
 use crate::curves::curve::{CurveError, Spline};
-use crate::curves::vector::{Point, add, cross, dot, norm, scale, sub};
+use crate::curves::vector::{Point, add, cross, dot, plain_norm, scale, sub};
 use crate::util::each::Each;
 
 /// Control points of a surface, at most.
@@ -112,6 +112,7 @@ impl Coons {
     }
 
     /// Of points and derivatives of the sides.
+    #[inline]
     fn blended(
         &self,
         [u, v]: [f64; 2],
@@ -193,13 +194,13 @@ impl Coons {
         let rows: Vec<Vec<[Point; 2]>> =
             self.grid(us, vs).into_iter().map(|row| row.into_iter().map(|(_, slopes)| slopes).collect()).collect();
         let normals: Vec<Point> = rows.iter().flatten().map(|[du, dv]| cross(*du, *dv)).collect();
-        let longest = |all: &mut dyn Iterator<Item = &Point>| all.fold(0.0_f64, |most, one| most.max(norm(*one)));
+        let longest = |all: &mut dyn Iterator<Item = &Point>| all.fold(0.0_f64, |most, one| most.max(plain_norm(*one)));
         let size = longest(&mut rows.iter().flatten().flatten());
         let largest = longest(&mut normals.iter());
         if largest <= THINNEST * size * size || super::space::turns_away(&normals) {
             return true;
         }
-        let is_back = |(a, b): (&Point, &Point)| dot(*a, *b) < 0.0 && norm(*a).min(norm(*b)) > FLATTEST * largest;
+        let is_back = |(a, b): (&Point, &Point)| dot(*a, *b) < 0.0 && plain_norm(*a).min(plain_norm(*b)) > FLATTEST * largest;
         let rows: Vec<&[Point]> = normals.chunks(vs.len().max(1)).collect();
         rows.iter().any(|row| row.iter().zip(row.iter().skip(1)).any(is_back))
             || rows.windows(2).any(|pair| pair[0].iter().zip(pair[1]).any(is_back))

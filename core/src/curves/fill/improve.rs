@@ -2,7 +2,7 @@
 
 use super::lifted::Lifted;
 use super::mesh::of_triangle;
-use crate::curves::vector::{Point, cross, distance, norm, sub};
+use crate::curves::vector::{Point, cross, plain_distance, plain_norm, sub};
 use crate::util::each::Each;
 
 /// Rounds, at most.
@@ -183,7 +183,7 @@ impl<'a> Improved<'a> {
             for triangle in &corners {
                 // Triangles count by their size in space.
                 let [a, b, c] = triangle.each(|corner| self.point(corner));
-                let share = norm(cross(sub(b, a), sub(c, a)));
+                let share = plain_norm(cross(sub(b, a), sub(c, a)));
                 weight += share;
                 for corner in triangle {
                     let [x, y] = self.lifted.flat.places[*corner as usize];
@@ -219,7 +219,7 @@ impl<'a> Improved<'a> {
             let [(first, _), (second, _)] = edge;
             let Some([p, a, q, b]) = self.around(edge) else { continue };
             let poor = [first, second].each(|number| qualities[number] < POOR);
-            let length = |a: u32, b: u32| distance(self.point(a), self.point(b));
+            let length = |a: u32, b: u32| plain_distance(self.point(a), self.point(b));
             let is_longest = |c: u32| length(a, b) >= length(b, c).max(length(c, a));
             let is_wanted = (poor[0] && is_longest(p)) || (poor[1] && is_longest(q));
             if !is_wanted || self.lifted.points.len() >= most || touched[first] || touched[second] || p == q {

@@ -9,7 +9,7 @@ use super::layout::{Corner, Rim, Wish};
 use super::lifted::Lifted;
 use super::mesh::of_triangle;
 use super::options::Outline;
-use crate::curves::vector::{distance, dot, sub};
+use crate::curves::vector::{dot, plain_distance, sub};
 use crate::util::each::Each;
 
 /// Twice the ratio of radii below which a triangle is poor.
@@ -42,7 +42,7 @@ impl<'a> Angles<'a> {
             for at in 0..count {
                 let numbers = [at + count - 1, at, at + 1].each(|at| (first + at % count) as u32);
                 let [before, own, next] = numbers.each(|number| lifted.point(number));
-                let product = distance(before, own) * distance(own, next);
+                let product = plain_distance(before, own) * plain_distance(own, next);
                 // At the end of a cut or a seam, the surface is whole.
                 let corner = |at: usize| ring.get(at % count).map(|(corner, _)| *corner);
                 let is_end = corner(at + count - 1) == corner(at + 1);
@@ -89,7 +89,7 @@ impl<'a> Angles<'a> {
             let corner = |at: usize| ring.get(at % count).map(|(corner, _)| *corner);
             let length = |at: usize| {
                 let [a, b] = [at, at + 1].each(|at| lifted.point((first + at % count) as u32));
-                distance(a, b)
+                plain_distance(a, b)
             };
             let mut add = |at: usize, share: f64| {
                 if let (Some(a), Some(b)) = (corner(at), corner(at + 1)) {

@@ -6,6 +6,7 @@
 use super::{Submesh, Vertex};
 use crate::geometry::distance::{place, share_along};
 use crate::geometry::sums::Bounds;
+use crate::util::each::Each;
 use crate::util::radix::sort_by_number;
 use crate::util::scatter::Hashing;
 use crate::util::{parallel, steps};
@@ -126,7 +127,7 @@ impl Cell {
     /// Of the largest size that no two points in one cell are farther from each other than this.
     fn of(position: [f32; 3], reach: f64) -> Self {
         let exponent = (reach / 3f64.sqrt()).log2().floor();
-        Self { exponent: exponent as i32, at: position.map(|x| (f64::from(x) * (-exponent).exp2()).floor() as i64) }
+        Self { exponent: exponent as i32, at: position.each(|x| (f64::from(x) * (-exponent).exp2()).floor() as i64) }
     }
 }
 

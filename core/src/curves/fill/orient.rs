@@ -95,3 +95,26 @@ fn volumes(mesh: &Mesh, flips: &[bool], component: impl Fn(usize) -> Option<u32>
     }
     volumes
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A tetrahedron, each face three triangles around a point within, the second face turned: it is turned back, whether edges to points
+    /// within are known to be the own ones of their face or not.
+    #[test]
+    fn edges_within_an_outline_tell_nothing() {
+        let corners = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        let faces = [[0, 2, 1], [0, 3, 1], [0, 3, 2], [1, 2, 3_usize]];
+        let mut mesh = Mesh { points: corners.to_vec(), ..Mesh::default() };
+        for (number, [a, b, c]) in faces.into_iter().enumerate() {
+            let middle = mesh.points.len() as u32;
+            mesh.points.push([0, 1, 2].map(|axis| (corners[a][axis] + corners[b][axis] + corners[c][axis]) / 3.0));
+            mesh.triangles.extend([[a, b], [b, c], [c, a]].map(|[a, b]| [a as u32, b as u32, middle]));
+            mesh.face_of.resize(mesh.triangles.len(), number as u32);
+        }
+        for is_plain in [&[true; 4][..], &[]] {
+            assert_eq!(flipped(&mesh, 4, Common { rims: 4, is_plain }, |_| false), [false, true, false, false]);
+        }
+    }
+}

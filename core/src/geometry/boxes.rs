@@ -94,8 +94,8 @@ impl BoxTree {
     }
 }
 
-/// Brings boxes near each other together in `order`, so many at a time: halves by the middles of the boxes, along the longest side of these, and halves of
-/// these.
+/// Brings boxes near each other together in `order`, so many at a time: halves by the middles of the boxes, along the longest side of
+/// these, and halves of these.
 fn halve(boxes: &[Bounds], order: &mut [u32]) {
     if order.len() <= AT_ONCE {
         return;

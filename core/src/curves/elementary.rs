@@ -1,6 +1,7 @@
 //! Surfaces of an equation: planes, cylinders, cones, spheres and tori (the elementary surfaces of ISO 10303-42).
 
 use crate::curves::vector::{Affine, Point, add, cross, distance, dot, norm, scale, sub, unit};
+use crate::util::each::Each;
 
 /// An origin and three axes, each of length 1 and perpendicular to the others, right-handed.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -25,7 +26,7 @@ impl Frame {
     #[must_use]
     pub fn inside(&self, point: Point) -> Point {
         let offset = sub(point, self.origin);
-        self.axes.map(|axis| dot(offset, axis))
+        self.axes.each(|axis| dot(offset, axis))
     }
 
     /// The point of coordinates in this frame.

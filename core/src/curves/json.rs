@@ -21,17 +21,16 @@ const UNITS: [(&str, f64); 6] = [("mm", 1.0), ("cm", 10.0), ("m", 1000.0), ("inc
 /// [`ReadError::Json`] of the first place that is wrong.
 pub(crate) fn read(text: &[u8]) -> Result<Network, ReadError> {
     let value: Value = serde_json::from_slice(text).map_err(|error| refused("", error.to_string()))?;
-    let top = Place { path: String::new(), value: &value };
+    let top = Place { above: None, step: Step::Field(""), value: &value };
     let fields = top.object(&["unit", "curves"])?;
-    let unit = fields.get("unit").map(|unit| top.field("unit", unit)).transpose()?;
-    let unit = match unit {
-        Some(unit) => unit.unit()?,
+    let unit = match fields.get("unit") {
+        Some(unit) => top.field("unit", unit).unit()?,
         None => return Err(top.refused("“unit” is missing")),
     };
     let curves = fields.get("curves").ok_or_else(|| top.refused("“curves” is missing"))?;
     let mut reader = Reader { vertices: HashMap::new(), digits: 0 };
     let mut list = Vec::new();
-    for (number, curve) in top.field("curves", curves)?.items()?.into_iter().enumerate() {
+    for (number, curve) in top.field("curves", curves).items()?.enumerate() {
         list.push(reader.curve(number as u64, &curve)?);
     }
     Ok(Network { unit, resolution: None, digits: reader.digits, curves: list, faces: Vec::new(), findings: Vec::new() })
@@ -42,20 +41,37 @@ fn refused(path: &str, problem: impl Into<String>) -> ReadError {
     ReadError::Json { path, problem: problem.into() }
 }
 
-/// A value and where it stands.
+/// A value and where it stands. Its path is written when it is asked for: of what is right, nobody wants it.
+#[derive(Clone, Copy)]
 struct Place<'a> {
-    path: String,
+    above: Option<&'a Place<'a>>,
+    step: Step<'a>,
     value: &'a Value,
 }
 
+/// The last step of a path.
+#[derive(Clone, Copy)]
+enum Step<'a> {
+    Field(&'a str),
+    Item(usize),
+}
+
 impl<'a> Place<'a> {
-    fn refused(&self, problem: impl Into<String>) -> ReadError {
-        refused(&self.path, problem)
+    fn path(&self) -> String {
+        let above = self.above.map(Self::path).unwrap_or_default();
+        match self.step {
+            Step::Field(name) if above.is_empty() => name.to_owned(),
+            Step::Field(name) => format!("{above}.{name}"),
+            Step::Item(number) => format!("{above}[{number}]"),
+        }
     }
 
-    fn field(&self, name: &str, value: &'a Value) -> Result<Self, ReadError> {
-        let path = if self.path.is_empty() { name.to_owned() } else { format!("{}.{name}", self.path) };
-        Ok(Self { path, value })
+    fn refused(&self, problem: impl Into<String>) -> ReadError {
+        refused(&self.path(), problem)
+    }
+
+    fn field<'b>(&'b self, name: &'b str, value: &'b Value) -> Place<'b> {
+        Place { above: Some(self), step: Step::Field(name), value }
     }
 
     fn object(&self, known: &[&str]) -> Result<&'a Map<String, Value>, ReadError> {
@@ -66,10 +82,10 @@ impl<'a> Place<'a> {
         }
     }
 
-    fn items(&self) -> Result<Vec<Self>, ReadError> {
+    fn items<'b>(&'b self) -> Result<impl ExactSizeIterator<Item = Place<'b>>, ReadError> {
         let list = self.value.as_array().ok_or_else(|| self.refused("a list is expected"))?;
-        let item = |(number, value)| Self { path: format!("{}[{number}]", self.path), value };
-        Ok(list.iter().enumerate().map(item).collect())
+        let item = |(number, value)| Place { above: Some(self), step: Step::Item(number), value };
+        Ok(list.iter().enumerate().map(item))
     }
 
     fn text(&self) -> Result<&'a str, ReadError> {
@@ -81,12 +97,17 @@ impl<'a> Place<'a> {
     }
 
     fn numbers(&self) -> Result<Vec<f64>, ReadError> {
-        self.items()?.iter().map(Self::number).collect()
+        self.items()?.map(|item| item.number()).collect()
     }
 
     fn point(&self) -> Result<Point, ReadError> {
-        let numbers = self.numbers()?;
-        numbers.as_slice().try_into().map_err(|_| self.refused(format!("three coordinates are expected, not {}", numbers.len())))
+        let mut items = self.items()?;
+        let count = items.len();
+        let three = (items.next(), items.next(), items.next());
+        let (Some(x), Some(y), Some(z), 3) = (three.0, three.1, three.2, count) else {
+            return Err(self.refused(format!("three coordinates are expected, not {count}")));
+        };
+        Ok([x.number()?, y.number()?, z.number()?])
     }
 
     fn unit(&self) -> Result<Unit, ReadError> {
@@ -106,18 +127,18 @@ struct Reader {
 impl Reader {
     fn curve(&mut self, number: u64, place: &Place<'_>) -> Result<Curve, ReadError> {
         let fields = place.object(&["id", "ends", "line", "polyline", "degree", "knots", "points", "weights"])?;
-        let field = |name: &str| fields.get(name).map(|value| place.field(name, value)).transpose();
+        let field = |name: &'static str| fields.get(name).map(|value| place.field(name, value));
         let lack = |name: &str| place.refused(format!("“{name}” is missing"));
-        let shape = match (field("line")?, field("polyline")?, field("degree")?) {
+        let shape = match (field("line"), field("polyline"), field("degree")) {
             (Some(line), None, None) => match self.points(&line)?.as_slice() {
                 &[start, end] => Shape::Line([start, end]),
                 points => return Err(line.refused(format!("two points are expected, not {}", points.len()))),
             },
             (None, Some(line), None) => Shape::polyline(self.points(&line)?).map_err(|error| line.refused(error.to_string()))?,
             (None, None, Some(degree)) => {
-                let knots = field("knots")?.ok_or_else(|| lack("knots"))?.numbers()?;
-                let points = self.points(&field("points")?.ok_or_else(|| lack("points"))?)?;
-                let weights = field("weights")?.map(|weights| weights.numbers()).transpose()?;
+                let knots = field("knots").ok_or_else(|| lack("knots"))?.numbers()?;
+                let points = self.points(&field("points").ok_or_else(|| lack("points"))?)?;
+                let weights = field("weights").map(|weights| weights.numbers()).transpose()?;
                 let whole = degree.value.as_u64().and_then(|degree| usize::try_from(degree).ok());
                 let whole = whole.ok_or_else(|| degree.refused("a whole number is expected"))?;
                 let spline = Spline::new(whole, knots, points, weights, None);
@@ -129,8 +150,8 @@ impl Reader {
         if let Some(name) = ["knots", "points", "weights"].into_iter().find(|name| !is_spline && fields.contains_key(*name)) {
             return Err(place.refused(format!("“{name}” without “degree”")));
         }
-        let name = field("id")?.map(|id| id.text().map(str::to_owned)).transpose()?;
-        let vertices = field("ends")?.map(|ends| self.ends(&ends)).transpose()?;
+        let name = field("id").map(|id| id.text().map(str::to_owned)).transpose()?;
+        let vertices = field("ends").map(|ends| self.ends(&ends)).transpose()?;
         let source = Source { id: Id::Place(number), line: 0 };
         Ok(Curve { shape, source, name, role: Role::Free, is_blanked: false, vertices })
     }
@@ -146,7 +167,7 @@ impl Reader {
     }
 
     fn ends(&mut self, place: &Place<'_>) -> Result<[u64; 2], ReadError> {
-        let items = place.items()?;
+        let items: Vec<Place<'_>> = place.items()?.collect();
         let [start, end] = items.as_slice() else { return Err(place.refused("two names are expected")) };
         let mut vertex = |name: &Place<'_>| -> Result<u64, ReadError> {
             let next = self.vertices.len() as u64;

@@ -4,6 +4,7 @@
 pub type Point = [f64; 3];
 
 /// `a + b`.
+#[inline]
 #[must_use]
 pub fn add(a: Point, b: Point) -> Point {
     let ([x, y, z], [u, v, w]) = (a, b);
@@ -11,6 +12,7 @@ pub fn add(a: Point, b: Point) -> Point {
 }
 
 /// `a − b`.
+#[inline]
 #[must_use]
 pub fn sub(a: Point, b: Point) -> Point {
     let ([x, y, z], [u, v, w]) = (a, b);
@@ -18,12 +20,15 @@ pub fn sub(a: Point, b: Point) -> Point {
 }
 
 /// `a · factor`.
+#[inline]
 #[must_use]
 pub fn scale(a: Point, factor: f64) -> Point {
-    a.map(|x| x * factor)
+    let [x, y, z] = a;
+    [x * factor, y * factor, z * factor]
 }
 
 /// Scalar product.
+#[inline]
 #[must_use]
 pub fn dot(a: Point, b: Point) -> f64 {
     let ([x, y, z], [u, v, w]) = (a, b);
@@ -31,6 +36,7 @@ pub fn dot(a: Point, b: Point) -> f64 {
 }
 
 /// Vector product.
+#[inline]
 #[must_use]
 pub fn cross(a: Point, b: Point) -> Point {
     let ([x, y, z], [u, v, w]) = (a, b);
@@ -38,6 +44,7 @@ pub fn cross(a: Point, b: Point) -> Point {
 }
 
 /// Length of a vector.
+#[inline]
 #[must_use]
 pub fn norm(a: Point) -> f64 {
     let [x, y, z] = a;
@@ -45,18 +52,21 @@ pub fn norm(a: Point) -> f64 {
 }
 
 /// Distance of two points.
+#[inline]
 #[must_use]
 pub fn distance(a: Point, b: Point) -> f64 {
     norm(sub(a, b))
 }
 
 /// The point at `t` between `a` (0) and `b` (1); exact at both.
+#[inline]
 #[must_use]
 pub fn between(a: Point, b: Point, t: f64) -> Point {
     add(scale(a, 1.0 - t), scale(b, t))
 }
 
 /// The direction of a vector; `None` of one that has none.
+#[inline]
 #[must_use]
 pub fn unit(a: Point) -> Option<Point> {
     let length = norm(a);
@@ -64,11 +74,19 @@ pub fn unit(a: Point) -> Option<Point> {
 }
 
 /// Length of a vector by a plain root: much faster than [`norm`], for lengths whose squares do not overflow.
+#[inline]
 pub(crate) fn plain_norm(a: Point) -> f64 {
     dot(a, a).sqrt()
 }
 
+/// Distance of two points by [`plain_norm`].
+#[inline]
+pub(crate) fn plain_distance(a: Point, b: Point) -> f64 {
+    plain_norm(sub(a, b))
+}
+
 /// The direction of a vector by [`plain_norm`]; `None` of one that has none.
+#[inline]
 pub(crate) fn plain_unit(a: Point) -> Option<Point> {
     let length = plain_norm(a);
     (length > 0.0 && length.is_finite()).then(|| scale(a, 1.0 / length))
@@ -115,7 +133,8 @@ impl Affine {
     /// The image of a vector.
     #[must_use]
     pub fn vector(&self, vector: Point) -> Point {
-        self.rows.map(|row| dot(row, vector))
+        let [x, y, z] = self.rows;
+        [dot(x, vector), dot(y, vector), dot(z, vector)]
     }
 
     /// This map behind another one: `x ↦ self(first(x))`.

@@ -8,7 +8,7 @@ use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
 use crate::geometry::distance::place;
 use crate::geometry::sums::Bounds;
 use crate::geometry::wide_boxes::WideTree;
-use crate::util::scatter;
+use crate::util::{parallel, scatter};
 
 /// A plane that misses a box by less than this share of the coordinates, more than rounding does, is taken to meet it.
 const ROUNDING: f64 = 64.0 * f64::EPSILON;
@@ -24,14 +24,20 @@ pub(crate) struct BoxTree {
 impl BoxTree {
     /// O(n log n).
     pub(crate) fn new(boxes: &[Bounds]) -> Self {
+        Self::by(1, boxes)
+    }
+
+    /// The same tree, made by so many threads.
+    pub(crate) fn by(threads: usize, boxes: &[Bounds]) -> Self {
         let mut order: Vec<u32> = (0..boxes.len() as u32).collect();
-        halve(boxes, &mut order, &mut |group| {
+        halve(boxes, &mut order);
+        let groups: Vec<&[u32]> = order.chunks(AT_ONCE).collect();
+        let ordered = parallel::map(threads, groups.len(), |at| {
+            let group = groups[at];
             let own: Vec<Bounds> = group.iter().map(|i| boxes[*i as usize]).collect();
-            let places = in_order(&hierarchy(&own));
-            let numbers: Vec<u32> = places.into_iter().map(|place| group[place as usize]).collect();
-            group.copy_from_slice(&numbers);
+            in_order(&hierarchy(&own)).into_iter().map(|place| group[place as usize]).collect::<Vec<u32>>()
         });
-        Self { wide: WideTree::new(order, boxes) }
+        Self { wide: WideTree::new(ordered.concat(), boxes) }
     }
 
     /// Replaces `found` by the numbers of all boxes that meet `wanted`, ascending: the tree's own order is not to be relied on.
@@ -88,10 +94,11 @@ impl BoxTree {
     }
 }
 
-/// Gives `order` boxes near each other, so many at a time: halves by the middles of the boxes, along the longest side of these, and halves of these.
-fn halve(boxes: &[Bounds], order: &mut [u32], visit: &mut impl FnMut(&mut [u32])) {
+/// Brings boxes near each other together in `order`, so many at a time: halves by the middles of the boxes, along the longest side of
+/// these, and halves of these.
+fn halve(boxes: &[Bounds], order: &mut [u32]) {
     if order.len() <= AT_ONCE {
-        return visit(order);
+        return;
     }
     // Twice that.
     let middle = |i: u32, k: usize| f64::from(boxes[i as usize].lo[k]) + f64::from(boxes[i as usize].hi[k]);
@@ -106,8 +113,8 @@ fn halve(boxes: &[Bounds], order: &mut [u32], visit: &mut impl FnMut(&mut [u32])
     let half = (order.len() / 2).next_multiple_of(AT_ONCE).min(order.len() - 1);
     order.select_nth_unstable_by(half, |a, b| middle(*a, axis).total_cmp(&middle(*b, axis)).then(a.cmp(b)));
     let (below, above) = order.split_at_mut(half);
-    halve(boxes, below, visit);
-    halve(boxes, above, visit);
+    halve(boxes, below);
+    halve(boxes, above);
 }
 
 /// A hierarchy over a few boxes.

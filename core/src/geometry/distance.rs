@@ -1,5 +1,6 @@
 //! Distances and nearest points, in f64: they rank and bound, and decide on no validity.
 
+use crate::util::each::Each;
 use glam::DVec3;
 
 /// How near vertices are that become one.
@@ -60,7 +61,7 @@ pub(crate) fn nearest_of_triangle(points: &[DVec3; 3], p: DVec3) -> DVec3 {
     if [(a, b), (b, c), (c, a)].iter().all(|(u, v)| (*v - *u).cross(p - *u).dot(n) > 0.0) {
         return p - n * ((p - a).dot(n) / n.length_squared());
     }
-    let sides = [(a, b), (b, c), (c, a)].map(|(u, v)| nearest_of_segment(u, v, p));
+    let sides = [(a, b), (b, c), (c, a)].each(|(u, v)| nearest_of_segment(u, v, p));
     sides[1..].iter().fold(sides[0], |best, q| if q.distance(p) < best.distance(p) { *q } else { best })
 }
 
@@ -80,7 +81,7 @@ pub(crate) fn square_distance(p: DVec3, [a, b, c]: [DVec3; 3]) -> f64 {
 
 /// The length of a triangle's longest edge.
 pub(crate) fn longest_edge(corners: &[[f32; 3]; 3]) -> f64 {
-    let [a, b, c] = corners.map(place);
+    let [a, b, c] = corners.each(place);
     a.distance_squared(b).max(b.distance_squared(c)).max(c.distance_squared(a)).sqrt()
 }
 

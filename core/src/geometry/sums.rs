@@ -2,6 +2,7 @@
 
 use crate::geometry::position::canonical;
 use crate::io::record::Point;
+use crate::util::each::Each;
 
 /// Axis-parallel box of finite positions; −0.0 and 0.0 are one value.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -143,7 +144,7 @@ impl Measure {
     /// One triangle's terms.
     #[inline]
     pub(crate) fn triangle(&self, corners: &[[f32; 3]; 3]) -> Extent {
-        let [a, b, c] = corners.map(|p| p.map(f64::from));
+        let [a, b, c] = corners.each(|p| p.each(f64::from));
         let (area, volume) = self.terms(a, b, c);
         Extent { area: whole(area), volume: whole(volume) }
     }

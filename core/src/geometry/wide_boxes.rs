@@ -3,6 +3,7 @@
 use glam::Vec4;
 
 use crate::geometry::sums::Bounds;
+use crate::util::each::Each;
 use crate::util::steps;
 
 /// Boxes of a node.
@@ -23,7 +24,7 @@ struct Wanted {
 impl Wanted {
     #[inline(always)]
     fn of(bounds: &Bounds) -> Self {
-        Self { lo: bounds.lo.map(Vec4::splat), hi: bounds.hi.map(Vec4::splat) }
+        Self { lo: bounds.lo.each(Vec4::splat), hi: bounds.hi.each(Vec4::splat) }
     }
 }
 

@@ -6,6 +6,7 @@
 use super::{Submesh, Vertex};
 use crate::geometry::distance::{place, share_along};
 use crate::geometry::sums::Bounds;
+use crate::util::each::Each;
 use crate::util::radix::sort_by_number;
 use crate::util::scatter::Hashing;
 use crate::util::{parallel, steps};
@@ -24,7 +25,8 @@ pub(crate) struct Member {
 /// Vertices that are all within the reach of each other; often only one.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Crowd {
-    first: u32,
+    /// The place of its first member among all.
+    pub(crate) first: u32,
     pub(crate) count: u32,
     /// Of its vertices.
     pub(crate) bounds: Bounds,
@@ -59,6 +61,9 @@ impl Crowds {
             crowds.add(submesh, first, together.len());
             first += together.len();
         }
+        // In the order of the vertices again, not in that of the hashes: what one crowd has around it the next one meets in the cache.
+        let Self { members, all } = &mut crowds;
+        sort_by_number(all, |crowd| members[crowd.first as usize].vertex);
         crowds
     }
 
@@ -122,7 +127,7 @@ impl Cell {
     /// Of the largest size that no two points in one cell are farther from each other than this.
     fn of(position: [f32; 3], reach: f64) -> Self {
         let exponent = (reach / 3f64.sqrt()).log2().floor();
-        Self { exponent: exponent as i32, at: position.map(|x| (f64::from(x) * (-exponent).exp2()).floor() as i64) }
+        Self { exponent: exponent as i32, at: position.each(|x| (f64::from(x) * (-exponent).exp2()).floor() as i64) }
     }
 }
 

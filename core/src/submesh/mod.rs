@@ -27,6 +27,7 @@ use crate::io::record::{self, Record};
 use crate::topology::chunk::IrregularTriangle;
 use crate::topology::survey::Survey;
 use crate::topology::vertex_table::Weld;
+use crate::util::each::Each;
 use crate::util::ids::NONE;
 use crate::util::lean;
 use crate::util::scatter::Hashing;
@@ -123,7 +124,7 @@ impl Gathering {
     /// Adds the triangle that is or stands in for the record at `place`, of whose vertices some have their whole star here (bit k of
     /// `complete`: corner k), and the others belong to `region`, or [`NONE`].
     pub(crate) fn add(&mut self, place: u32, corners: [[f32; 3]; 3], complete: u8, region: u32) {
-        let v = corners.map(|p| self.weld.vertex(p));
+        let v = corners.each(|p| self.weld.vertex(p));
         self.complete.resize(self.weld.positions().len(), false);
         for (k, vertex) in v.iter().enumerate() {
             self.complete[*vertex as usize] |= complete >> k & 1 == 1;
@@ -313,7 +314,7 @@ impl Submesh {
     }
 
     pub(crate) fn points(&self, t: u32) -> [[f32; 3]; 3] {
-        self.triangles[t as usize].v.map(|v| self.positions[v as usize])
+        self.triangles[t as usize].v.each(|v| self.positions[v as usize])
     }
 
     /// Exactly collinear corners.

@@ -7,6 +7,7 @@ use crate::geometry::boxes::BoxTree;
 pub(crate) use crate::geometry::distance::Tolerance;
 use crate::geometry::distance::{place, share_along};
 use crate::geometry::sums::Bounds;
+use crate::util::each::Each;
 use crate::util::{parallel, steps};
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
@@ -34,15 +35,15 @@ pub(crate) fn close_pairs(submesh: &Submesh, edges: &Edges, tolerance: &Toleranc
         return Vec::new();
     }
     let crowds = Crowds::of(submesh, &vertices, |v| tolerance.at(submesh, v), threads);
-    let tree = BoxTree::new(&crowds.all.iter().map(|crowd| crowd.bounds).collect::<Vec<_>>());
-    let mut pairs = parallel::gather(threads, &crowds.all, |met, (i, crowd), pairs| {
+    let tree = BoxTree::by(threads, &crowds.all.iter().map(|crowd| crowd.bounds).collect::<Vec<_>>());
+    let mut pairs = parallel::gather(threads, &crowds.all, |met, (_, crowd), pairs| {
         pairs.extend(crowds.members(&crowd).windows(2).map(|two| (two[0].vertex, two[1].vertex)));
         tree.meeting(&wider(&crowd.bounds, crowd.most), met);
         steps::count(met.len() + crowd.count as usize);
         // Of two crowds, the one that reaches less far looks for the other.
-        let others = met.iter().map(|j| (*j as usize, &crowds.all[*j as usize]));
-        let others = others.filter(|(j, other)| (crowd.least, i) < (other.least, *j));
-        pairs.extend(others.filter_map(|(_, other)| crowds.pair_of(submesh, &crowd, other)));
+        let others = met.iter().map(|j| &crowds.all[*j as usize]);
+        let others = others.filter(|other| (crowd.least, crowd.first) < (other.least, other.first));
+        pairs.extend(others.filter_map(|other| crowds.pair_of(submesh, &crowd, other)));
     });
     pairs.sort_unstable();
     pairs
@@ -102,7 +103,7 @@ pub(crate) fn on_edges(submesh: &Submesh, edges: &Edges, reach: impl Fn(Vertex) 
         let e = edges.get(i as usize);
         [submesh.positions[e.low as usize], submesh.positions[e.high as usize]]
     };
-    let tree = BoxTree::new(&boundary.iter().map(|i| around(&ends(*i), 0.0)).collect::<Vec<_>>());
+    let tree = BoxTree::by(threads, &boundary.iter().map(|i| around(&ends(*i), 0.0)).collect::<Vec<_>>());
     let crowds = Crowds::of(submesh, &boundary_vertices(edges), reach, threads);
     let mut all = parallel::gather(threads, &crowds.all, |met: &mut Vec<u32>, (_, crowd), all| {
         tree.meeting(&wider(&crowd.bounds, crowd.most), met);
@@ -129,7 +130,7 @@ pub(super) fn nearest_of(submesh: &Submesh, edges: &Edges, of: &[u32], vertex: V
         if submesh.triangles[e.uses[0].triangle() as usize].v.contains(&vertex) {
             continue;
         }
-        let [a, b] = [e.low, e.high].map(|v| submesh.positions[v as usize]);
+        let [a, b] = [e.low, e.high].each(|v| submesh.positions[v as usize]);
         let (at, off) = project(p, a, b);
         let length = distance(a, b);
         // Strictly inside, by more than the tolerance: what is nearer to an end is a matter of welding.
@@ -153,8 +154,8 @@ pub(crate) fn nearest_edge(submesh: &Submesh, edges: &Edges, tolerance: &Toleran
     if boundary.is_empty() {
         return f64::INFINITY;
     }
-    let ends = |e: &Edge<'_>| [e.low, e.high].map(|v| submesh.positions[v as usize]);
-    let tree = BoxTree::new(&boundary.iter().map(|e| around(&ends(e), 0.0)).collect::<Vec<_>>());
+    let ends = |e: &Edge<'_>| [e.low, e.high].each(|v| submesh.positions[v as usize]);
+    let tree = BoxTree::by(threads, &boundary.iter().map(|e| around(&ends(e), 0.0)).collect::<Vec<_>>());
     // Distances are not negative, so that their bits are in their order.
     let nearest = AtomicU64::new(f64::INFINITY.to_bits());
     let known = || f64::from_bits(nearest.load(Relaxed));
@@ -183,7 +184,7 @@ const ALMOST: f64 = 1.0 - 1e-9;
 
 /// Foot of `p` on the line a–b as a fraction from a, clamped to the segment, and its distance. 0 for an edge of no length.
 fn project(p: [f32; 3], a: [f32; 3], b: [f32; 3]) -> (f64, f64) {
-    let [p, a, b] = [p, a, b].map(place);
+    let [p, a, b] = [p, a, b].each(place);
     let at = share_along(p, a, b);
     (at, (p - a - (b - a) * at).length())
 }
@@ -202,8 +203,8 @@ pub(crate) fn around(points: &[[f32; 3]], by: f64) -> Bounds {
 fn wider(b: &Bounds, by: f64) -> Bounds {
     // Rounded outward, so that nothing is missed.
     Bounds {
-        lo: b.lo.map(|x| ((f64::from(x) - by) as f32).next_down()),
-        hi: b.hi.map(|x| ((f64::from(x) + by) as f32).next_up()),
+        lo: b.lo.each(|x| ((f64::from(x) - by) as f32).next_down()),
+        hi: b.hi.each(|x| ((f64::from(x) + by) as f32).next_up()),
     }
 }
 

@@ -3,6 +3,7 @@
 use super::error::{CurveError, HIGHEST_DEGREE};
 use super::length;
 use crate::curves::vector::{Affine, Point, is_finite, scale, sub};
+use crate::util::each::Each;
 
 /// A point times its weight, and the weight.
 pub(super) type Weighted = [f64; 4];
@@ -156,8 +157,8 @@ impl Spline {
         let slope = self.degree as f64 / (high - low);
         let ([ax, ay, az, aw], [bx, by, bz, bw]) = (a, b);
         let weight = (1.0 - share) * aw + share * bw;
-        let point = [(ax, bx), (ay, by), (az, bz)].map(|(a, b)| ((1.0 - share) * a + share * b) / weight);
-        let change = [bx - ax, by - ay, bz - az].map(|change| change * slope);
+        let point = [(ax, bx), (ay, by), (az, bz)].each(|(a, b)| ((1.0 - share) * a + share * b) / weight);
+        let change = [bx - ax, by - ay, bz - az].each(|change| change * slope);
         let derivative = scale(sub(change, scale(point, (bw - aw) * slope)), 1.0 / weight);
         (point, derivative)
     }

@@ -13,6 +13,7 @@ use super::space;
 use crate::curves::curve::{CurveError, Spline};
 use crate::curves::elementary::Frame;
 use crate::curves::vector::{Point, add, distance, scale, unit};
+use crate::util::each::Each;
 
 /// Cubic curves of a loop in its direction, with their lengths, and the cosines between tangents where each begins.
 #[derive(Clone, Debug)]
@@ -67,7 +68,7 @@ pub(super) fn laid(coons: Coons, lengths: &[f64], ring: &[Rim]) -> Layout {
 /// Whether a Coons surface folds, on a grid between the points of its outline, so that what its curves do is not missed: 8 to 64
 /// parameters each way.
 pub(super) fn is_coons_folded(coons: &Coons, ring: &[Rim]) -> bool {
-    let mut cuts = [0, 1].map(|_| (0..=LEAST).map(|at| f64::from(at) / f64::from(LEAST)).collect::<Vec<f64>>());
+    let mut cuts = [0, 1].each(|_| (0..=LEAST).map(|at| f64::from(at) / f64::from(LEAST)).collect::<Vec<f64>>());
     for rim in ring {
         let (side, low, high) = coons.spans.get(rim.part as usize).copied().unwrap_or_default();
         let [u, v] = coons.parameters(side, low + (high - low) * rim.share);
@@ -114,7 +115,7 @@ fn form(lengths: &[f64], coons: &Coons) -> Form {
             Form::Trapezoid { widths: [a, 0.0], height, shear: x - 0.5 * a, is_turned: false }
         }
         _ => {
-            let [low, high] = [0.0, 1.0].map(|v| coons.point_and_derivatives([0.5, v]).0);
+            let [low, high] = [0.0, 1.0].each(|v| coons.point_and_derivatives([0.5, v]).0);
             let length = 0.5 * lengths.iter().sum::<f64>();
             Form::Lens([length, distance(low, high).max(0.01 * length)])
         }
@@ -153,7 +154,7 @@ pub(super) fn centre(curves: &Curves, ring: &[Rim]) -> Result<Cone, FitError> {
     let (curve, ends) = sides::join(&curves.parts)?;
     let samples: Vec<Point> = match curves.parts.as_slice() {
         [(one, _)] => (0..64).map(|at| one.point_and_derivative(f64::from(at) / 64.0).0).collect(),
-        parts => parts.iter().flat_map(|(part, _)| [0.0, 0.5].map(|t| part.point_and_derivative(t).0)).collect(),
+        parts => parts.iter().flat_map(|(part, _)| [0.0, 0.5].each(|t| part.point_and_derivative(t).0)).collect(),
     };
     let centre = space::mean(&samples);
     let far = samples.iter().map(|point| distance(*point, centre)).sum::<f64>() / samples.len().max(1) as f64;

@@ -8,7 +8,8 @@ use super::plate::Plate;
 use crate::curves::curve::Spline;
 use crate::curves::elementary::Elementary;
 use crate::curves::elementary::Frame;
-use crate::curves::vector::{Point, add, between, dot, norm, scale};
+use crate::curves::vector::{Point, add, between, dot, norm, plain_norm, scale};
+use crate::util::each::Each;
 
 /// A flat map of a surface.
 #[derive(Clone, Debug)]
@@ -72,7 +73,7 @@ impl Form {
                 [u, 0.5 + y / (4.0 * u * (1.0 - u) * b)]
             }
         };
-        [u, v].map(|t| if t.is_finite() { t.clamp(0.0, 1.0) } else { 0.5 })
+        [u, v].each(|t| if t.is_finite() { t.clamp(0.0, 1.0) } else { 0.5 })
     }
 }
 
@@ -185,7 +186,7 @@ impl Chart {
         match self {
             Self::Plane(frame) => frame.outside([place[0], place[1], 0.0]),
             Self::Sphere(frame, radius) => {
-                let [x, y] = place.map(|x| 0.5 * x / radius);
+                let [x, y] = place.each(|x| 0.5 * x / radius);
                 let share = radius / (1.0 + x * x + y * y);
                 frame.outside(scale([2.0 * x, 2.0 * y, 1.0 - x * x - y * y], share))
             }
@@ -235,17 +236,17 @@ fn sagging(coons: &Coons, form: Form, chord: f64) -> f64 {
             [get(i + 1, j - 1), get(i - 1, j + 1)],
         ];
         for [a, b] in lines {
-            let sag = norm(add(scale(add(a, b), 0.5), scale(middle, -1.0)));
+            let sag = plain_norm(add(scale(add(a, b), 0.5), scale(middle, -1.0)));
             let across = add(b, scale(a, -1.0));
             if sag > 0.0 {
                 longest = longest.min((dot(across, across) * chord / sag).sqrt());
             }
         }
     }
-    let sum = |[a, b]: [Point; 2]| norm(add(b, scale(a, -1.0)));
+    let sum = |[a, b]: [Point; 2]| plain_norm(add(b, scale(a, -1.0)));
     let last = 2 * CELLS as usize;
     let around = [[(0, 0), (last, 0)], [(last, 0), (last, last)], [(last, last), (0, last)], [(0, last), (0, 0)]];
-    let mean = around.iter().map(|pair| sum(pair.map(|(i, j)| get(i, j)))).sum::<f64>() / 4.0;
+    let mean = around.iter().map(|pair| sum(pair.each(|(i, j)| get(i, j)))).sum::<f64>() / 4.0;
     let longest = longest.max(mean / 64.0);
     if matches!(form, Form::Trapezoid { .. }) { longest } else { 0.7 * longest }
 }

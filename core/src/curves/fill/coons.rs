@@ -7,7 +7,8 @@ use super::basis;
 use super::spline::SplineSurface;
 use super::sum::sum;
 use crate::curves::curve::{CurveError, Spline};
-use crate::curves::vector::{Point, add, cross, dot, norm, scale, sub};
+use crate::curves::vector::{Point, add, cross, dot, plain_norm, scale, sub};
+use crate::util::each::Each;
 
 /// Control points of a surface, at most.
 const MOST: usize = 1 << 22;
@@ -105,12 +106,13 @@ impl Coons {
         if let Some(base) = &self.base {
             return base.sum([u, v], base.rest.point_and_derivatives([u, v]));
         }
-        let along = [&self.along[0], &self.along[1]].map(|side| side.point_and_derivative(u));
-        let across = [&self.across[0], &self.across[1]].map(|side| side.point_and_derivative(v));
+        let along = [&self.along[0], &self.along[1]].each(|side| side.point_and_derivative(u));
+        let across = [&self.across[0], &self.across[1]].each(|side| side.point_and_derivative(v));
         self.blended([u, v], along, across)
     }
 
     /// Of points and derivatives of the sides.
+    #[inline]
     fn blended(
         &self,
         [u, v]: [f64; 2],
@@ -159,12 +161,12 @@ impl Coons {
         if let Some(base) = &self.base {
             return base.to_spline();
         }
-        let [u, v] = [&self.along, &self.across].map(|[a, b]| basis::union(a.knots(), b.knots()));
+        let [u, v] = [&self.along, &self.across].each(|[a, b]| basis::union(a.knots(), b.knots()));
         if u.len().saturating_mul(v.len()) > MOST {
             return Err(CurveError::Degenerate("a surface of more than 4,194,304 control points"));
         }
-        let [bottom, top] = [&self.along[0], &self.along[1]].map(|side| basis::refined(3, side.knots(), side.points(), &u));
-        let [left, right] = [&self.across[0], &self.across[1]].map(|side| basis::refined(3, side.knots(), side.points(), &v));
+        let [bottom, top] = [&self.along[0], &self.along[1]].each(|side| basis::refined(3, side.knots(), side.points(), &u));
+        let [left, right] = [&self.across[0], &self.across[1]].each(|side| basis::refined(3, side.knots(), side.points(), &v));
         let (means, heights) = (basis::greville(3, &u), basis::greville(3, &v));
         let [p, q, s, e] = self.corners;
         let mix = |a: Point, b: Point, t: f64| add(scale(a, 1.0 - t), scale(b, t));
@@ -192,13 +194,13 @@ impl Coons {
         let rows: Vec<Vec<[Point; 2]>> =
             self.grid(us, vs).into_iter().map(|row| row.into_iter().map(|(_, slopes)| slopes).collect()).collect();
         let normals: Vec<Point> = rows.iter().flatten().map(|[du, dv]| cross(*du, *dv)).collect();
-        let longest = |all: &mut dyn Iterator<Item = &Point>| all.fold(0.0_f64, |most, one| most.max(norm(*one)));
+        let longest = |all: &mut dyn Iterator<Item = &Point>| all.fold(0.0_f64, |most, one| most.max(plain_norm(*one)));
         let size = longest(&mut rows.iter().flatten().flatten());
         let largest = longest(&mut normals.iter());
         if largest <= THINNEST * size * size || super::space::turns_away(&normals) {
             return true;
         }
-        let is_back = |(a, b): (&Point, &Point)| dot(*a, *b) < 0.0 && norm(*a).min(norm(*b)) > FLATTEST * largest;
+        let is_back = |(a, b): (&Point, &Point)| dot(*a, *b) < 0.0 && plain_norm(*a).min(plain_norm(*b)) > FLATTEST * largest;
         let rows: Vec<&[Point]> = normals.chunks(vs.len().max(1)).collect();
         rows.iter().any(|row| row.iter().zip(row.iter().skip(1)).any(is_back))
             || rows.windows(2).any(|pair| pair[0].iter().zip(pair[1]).any(is_back))

@@ -117,9 +117,8 @@ fn made(
     let mut divided = network::divide(&strands, outlines, options, &[]);
     if options.size.is_none() {
         // Curves are divided as finely as their surfaces have to be, else triangles between both would be flat.
-        let dry: Vec<Patch> =
-            tasks((&strands, &tried), (outlines, &[]), options, &divided, true).par_iter().map(Task::run).collect();
-        let longest: Vec<f64> = dry.iter().map(|patch| COARSER * patch.longest).collect();
+        let dry = tasks((&strands, &tried), (outlines, &[]), options, &divided, true);
+        let longest: Vec<f64> = dry.par_iter().map(|task| COARSER * task.run().longest).collect();
         if network::is_coarser(&divided, &longest) {
             divided = network::divide(&strands, outlines, options, &longest);
         }
@@ -259,7 +258,11 @@ fn collected(
     (strands, outlines): (Strands<'_>, &[Outline]),
     origins: &[Origin],
 ) -> Result<Filled, FillError> {
+    let rims = points.len();
+    let is_plain: Vec<bool> = patches.iter().map(|patch| patch.is_plain).collect();
     let mut filled = Filled { mesh: Mesh { points, ..Mesh::default() }, ..Filled::default() };
+    filled.mesh.points.reserve_exact(patches.iter().map(|patch| patch.points.len()).sum());
+    filled.mesh.triangles.reserve_exact(patches.iter().map(|patch| patch.triangles.len()).sum());
     for (number, patch) in patches.into_iter().enumerate() {
         let first = filled.mesh.points.len();
         if first + patch.points.len() >= u32::MAX as usize {
@@ -275,7 +278,7 @@ fn collected(
         filled.surfaces.push(patch.surface);
         filled.reports.push(patch.report);
     }
-    let flipped = flipped(&mut filled, origins);
+    let flipped = flipped(&mut filled, orient::Common { rims, is_plain: &is_plain }, origins);
     for (triangle, face) in filled.mesh.triangles.iter_mut().zip(&filled.mesh.face_of) {
         if flipped.get(*face as usize) == Some(&true) {
             triangle.swap(1, 2);
@@ -287,7 +290,7 @@ fn collected(
 }
 
 /// Which outlines to turn over; those without a surface count as if they had a lid.
-fn flipped(filled: &mut Filled, origins: &[Origin]) -> Vec<bool> {
+fn flipped(filled: &mut Filled, common: orient::Common<'_>, origins: &[Origin]) -> Vec<bool> {
     let Filled { surfaces, mesh, .. } = filled;
     let (points, triangles) = (mesh.points.len(), mesh.triangles.len());
     for (number, surface) in surfaces.iter().enumerate() {
@@ -300,7 +303,8 @@ fn flipped(filled: &mut Filled, origins: &[Origin]) -> Vec<bool> {
         }
         mesh.face_of.resize(mesh.triangles.len(), number as u32);
     }
-    let flipped = orient::flipped(mesh, surfaces.len(), |outline| origins.get(outline).is_some_and(|origin| origin.is_void));
+    let flipped =
+        orient::flipped(mesh, surfaces.len(), common, |outline| origins.get(outline).is_some_and(|origin| origin.is_void));
     mesh.points.truncate(points);
     mesh.triangles.truncate(triangles);
     mesh.face_of.truncate(triangles);
@@ -352,7 +356,8 @@ mod tests {
             let surfaces = vec![plane.clone(), plane.clone(), plane.clone(), Surface::Fallback(vec![ring])];
             let mesh = Mesh { points: points.clone(), triangles, face_of: vec![0, 1, 2] };
             let mut filled = Filled { surfaces, mesh: mesh.clone(), ..Filled::default() };
-            assert_eq!(flipped(&mut filled, &[]), [is_inward, is_inward, is_inward, is_ring_turned]);
+            let common = orient::Common { rims: 4, is_plain: &[] };
+            assert_eq!(flipped(&mut filled, common, &[]), [is_inward, is_inward, is_inward, is_ring_turned]);
             assert_eq!(filled.mesh, mesh);
         }
     }

@@ -10,6 +10,7 @@ use super::near::Near;
 use super::strand::Strand;
 use crate::curves::Use;
 use crate::curves::vector::{Point, distance, dot, sub};
+use crate::util::each::Each;
 
 /// Rounds, at most: what one outline makes finer another one has to follow.
 const ROUNDS: u32 = 4;
@@ -170,7 +171,7 @@ impl Ring {
             return edge.length;
         }
         // Points of the edge itself, and of its neighbours, which share its corners.
-        let own = [count - 1, 0, 1, 2].map(|step| first + (at + step) % count);
+        let own = [count - 1, 0, 1, 2].each(|step| first + (at + step) % count);
         let is_other = |number: usize| {
             let beside = number.checked_sub(first).and_then(|at| self.edges.get(at));
             !own.contains(&number) && !beside.is_some_and(|other| self.is_in_wedge(edge.part, other.part))
@@ -265,7 +266,7 @@ fn split(wishes: &[Wish], shares: &[f64], points: &[Point]) -> Vec<f64> {
         let mut lengths = [f64::INFINITY; 2];
         let mut first: Option<f64> = None;
         for wish in own {
-            lengths = [0, 1].map(|end| lengths[end].min(wish.lengths[end]));
+            lengths = [0, 1].each(|end| lengths[end].min(wish.lengths[end]));
             first = wish.first.or(first);
         }
         let count = if lengths[0].is_finite() { pieces(length, lengths) } else { 1 };

@@ -2,7 +2,8 @@
 
 use super::lifted::Lifted;
 use super::mesh::of_triangle;
-use crate::curves::vector::{Point, cross, distance, norm, sub};
+use crate::curves::vector::{Point, cross, plain_distance, plain_norm, sub};
+use crate::util::each::Each;
 
 /// Rounds, at most.
 const ROUNDS: u32 = 5;
@@ -111,7 +112,7 @@ impl<'a> Improved<'a> {
                 let Some([p, a, q, b]) = self.around(edge) else { continue };
                 let before = qualities[first].min(qualities[second]);
                 let pair = [[p, a, q], [q, b, p]];
-                let both = pair.map(|one| self.quality(one));
+                let both = pair.each(|one| self.quality(one));
                 let after = both[0].min(both[1]);
                 let floor = 1e-9 * (self.area([p, a, b]) + self.area([q, b, a]));
                 if p != q
@@ -135,7 +136,7 @@ impl<'a> Improved<'a> {
 
     /// Whether both triangles behind a flip face as those before did.
     fn keeps_side(&self, [p, a, q, b]: [u32; 4]) -> bool {
-        let [p, a, q, b] = [p, a, q, b].map(|number| self.point(number));
+        let [p, a, q, b] = [p, a, q, b].each(|number| self.point(number));
         let normal = |a: Point, b: Point, c: Point| cross(sub(b, a), sub(c, a));
         let before = crate::curves::vector::add(normal(p, a, b), normal(q, b, a));
         [normal(p, a, q), normal(q, b, p)].into_iter().all(|one| crate::curves::vector::dot(one, before) > 0.0)
@@ -181,8 +182,8 @@ impl<'a> Improved<'a> {
             let corners: Vec<[u32; 3]> = star.iter().filter_map(|one| self.lifted.flat.triangles.get(*one)).copied().collect();
             for triangle in &corners {
                 // Triangles count by their size in space.
-                let [a, b, c] = triangle.map(|corner| self.point(corner));
-                let share = norm(cross(sub(b, a), sub(c, a)));
+                let [a, b, c] = triangle.each(|corner| self.point(corner));
+                let share = plain_norm(cross(sub(b, a), sub(c, a)));
                 weight += share;
                 for corner in triangle {
                     let [x, y] = self.lifted.flat.places[*corner as usize];
@@ -217,14 +218,14 @@ impl<'a> Improved<'a> {
         for edge in self.edges(&qualities, POOR) {
             let [(first, _), (second, _)] = edge;
             let Some([p, a, q, b]) = self.around(edge) else { continue };
-            let poor = [first, second].map(|number| qualities[number] < POOR);
-            let length = |a: u32, b: u32| distance(self.point(a), self.point(b));
+            let poor = [first, second].each(|number| qualities[number] < POOR);
+            let length = |a: u32, b: u32| plain_distance(self.point(a), self.point(b));
             let is_longest = |c: u32| length(a, b) >= length(b, c).max(length(c, a));
             let is_wanted = (poor[0] && is_longest(p)) || (poor[1] && is_longest(q));
             if !is_wanted || self.lifted.points.len() >= most || touched[first] || touched[second] || p == q {
                 continue;
             }
-            let [[x, y], [u, v]] = [a, b].map(|number| self.lifted.flat.places[number as usize]);
+            let [[x, y], [u, v]] = [a, b].each(|number| self.lifted.flat.places[number as usize]);
             let middle = self.lifted.points.len() as u32;
             let place = [0.5 * (x + u), 0.5 * (y + v)];
             self.lifted.flat.places.push(place);

@@ -10,6 +10,7 @@ use rayon::prelude::*;
 use super::chart::Chart;
 use super::triangles::Flat;
 use crate::curves::vector::{Point, cross, dot, sub};
+use crate::util::each::Each;
 
 /// No triangle: an edge of a ring has this beyond it.
 pub(super) const NONE: u32 = u32::MAX;
@@ -175,7 +176,7 @@ impl<'a> Lifted<'a> {
 
     fn split_triangle(&mut self, triangle: u32, place: [f64; 2], point: Point) -> Vec<u32> {
         let [a, b, c] = self.corners(triangle);
-        let [x, y, z] = [0, 1, 2].map(|corner| self.beyond(3 * triangle + corner));
+        let [x, y, z] = [0, 1, 2].each(|corner| self.beyond(3 * triangle + corner));
         let p = self.add(place, point);
         let first = self.flat.triangles.len() as u32;
         let all = [triangle, first, first + 1];
@@ -193,8 +194,8 @@ impl<'a> Lifted<'a> {
         let other = self.beyond(edge);
         let ([p, a, b], [q, ..]) = (self.around(edge), self.around(other));
         let (t, u) = (edge / 3, other / 3);
-        let [bp, pa] = [next(edge), next(next(edge))].map(|edge| self.beyond(edge));
-        let [aq, qb] = [next(other), next(next(other))].map(|edge| self.beyond(edge));
+        let [bp, pa] = [next(edge), next(next(edge))].each(|edge| self.beyond(edge));
+        let [aq, qb] = [next(other), next(next(other))].each(|edge| self.beyond(edge));
         let m = self.add(place, point);
         let first = self.flat.triangles.len() as u32;
         let (v, w) = (first, first + 1);
@@ -206,7 +207,7 @@ impl<'a> Lifted<'a> {
         }
         let outer = [(3 * t + 2, pa), (3 * v + 1, bp), (3 * u + 2, qb), (3 * w + 1, aq)];
         outer.into_iter().for_each(|(edge, beyond)| self.link_outer(edge, beyond));
-        outer.map(|(edge, _)| edge).to_vec()
+        outer.each(|(edge, _)| edge).to_vec()
     }
 
     fn link_outer(&mut self, edge: u32, beyond: u32) {
@@ -239,7 +240,7 @@ impl<'a> Lifted<'a> {
     }
 
     fn normal(&self, triangle: u32) -> Point {
-        let [a, b, c] = self.corners(triangle).map(|corner| self.point(corner));
+        let [a, b, c] = self.corners(triangle).each(|corner| self.point(corner));
         cross(sub(b, a), sub(c, a))
     }
 
@@ -256,7 +257,7 @@ impl<'a> Lifted<'a> {
         }
         let ([p, a, b], [q, ..]) = (self.around(edge), self.around(other));
         let pair = |triangles: [[u32; 3]; 2]| {
-            let [(x, m), (y, n)] = triangles.map(|[a, b, c]| cotangents(self.point(a), self.point(b), self.point(c)));
+            let [(x, m), (y, n)] = triangles.each(|[a, b, c]| cotangents(self.point(a), self.point(b), self.point(c)));
             (x + y, dot(m, n))
         };
         let (before, side) = pair([[p, a, b], [q, b, a]]);
@@ -274,8 +275,8 @@ impl<'a> Lifted<'a> {
         let other = self.beyond(edge);
         let ([p, a, b], [q, ..]) = (self.around(edge), self.around(other));
         let (t, u) = (edge / 3, other / 3);
-        let [bp, pa] = [next(edge), next(next(edge))].map(|edge| self.beyond(edge));
-        let [aq, qb] = [next(other), next(next(other))].map(|edge| self.beyond(edge));
+        let [bp, pa] = [next(edge), next(next(edge))].each(|edge| self.beyond(edge));
+        let [aq, qb] = [next(other), next(next(other))].each(|edge| self.beyond(edge));
         self.set(t, [p, a, q]);
         self.set(u, [q, b, p]);
         self.link(3 * t + 1, 3 * u + 1);

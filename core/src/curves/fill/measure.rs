@@ -2,6 +2,7 @@
 
 use crate::curves::curve::Shape;
 use crate::curves::vector::norm;
+use crate::util::each::Each;
 
 /// Nodes above 0 and weights of Gauss and Legendre's rule with 6 points on −1 to 1 (Abramowitz, Stegun, table 25.4).
 const RULE: [(f64, f64); 3] = [
@@ -34,7 +35,7 @@ impl Measure {
         for pair in cuts.windows(2) {
             let &[a, b] = pair else { continue };
             for number in 0..each {
-                let [from, to] = [number, number + 1].map(|at| a + (b - a) * f64::from(at) / f64::from(each));
+                let [from, to] = [number, number + 1].each(|at| a + (b - a) * f64::from(at) / f64::from(each));
                 ends.push(from);
                 sums.push(sum);
                 sum += length(shape, from, to);

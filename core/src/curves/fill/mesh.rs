@@ -1,6 +1,7 @@
 //! Triangles of outlines, and how even they are.
 
 use crate::curves::vector::{Point, cross, dot, sub};
+use crate::util::each::Each;
 
 /// Triangles of outlines.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -23,7 +24,7 @@ pub fn quality(mesh: &Mesh) -> Vec<f64> {
 /// Twice the ratio of the radii of the inner and the outer circle: 1 of a triangle with even sides, 0 of a flat one.
 pub(super) fn of_triangle(a: Point, b: Point, c: Point) -> f64 {
     let [u, v, w] = [sub(c, b), sub(a, c), sub(b, a)];
-    let [x, y, z] = [u, v, w].map(|side| dot(side, side).sqrt());
+    let [x, y, z] = [u, v, w].each(|side| dot(side, side).sqrt());
     let normal = cross(w, v);
     let product = x * y * z * (x + y + z);
     if product > 0.0 { 4.0 * dot(normal, normal) / product } else { 0.0 }

@@ -1,6 +1,7 @@
 //! The nearest of many points to a straight edge.
 
 use crate::curves::vector::{Point, distance, dot, scale, sub};
+use crate::util::each::Each;
 
 /// Points of a leaf, at most.
 const LEAF: usize = 8;
@@ -28,7 +29,7 @@ impl Near {
                 });
                 high - low
             };
-            let spreads = [0, 1, 2].map(spread);
+            let spreads = [0, 1, 2].each(spread);
             let axis = (0..3).fold(0, |best, axis| if spreads[axis] > spreads[best] { axis } else { best });
             let middle = part.len() / 2;
             part.select_nth_unstable_by(middle, |a, b| a.0[axis].total_cmp(&b.0[axis]).then(a.1.cmp(&b.1)));
@@ -59,7 +60,7 @@ impl Near {
             let (Some(entry), Some(axis)) = (part.get(middle), self.axes.get(from + middle)) else { continue };
             look(entry);
             let axis = usize::from(*axis);
-            let (cut, [a, b]) = (entry.0[axis], edge.map(|end| end[axis]));
+            let (cut, [a, b]) = (entry.0[axis], edge.each(|end| end[axis]));
             if a.min(b) - cut < best {
                 parts.push((from, from + middle));
             }

@@ -21,6 +21,7 @@ use super::unrolled;
 use crate::curves::Use;
 use crate::curves::elementary::Elementary;
 use crate::curves::vector::{Point, distance, dot, scale};
+use crate::util::each::Each;
 
 /// Gaps between curves count as inaccuracy of these up to this share of the size.
 const GAP: f64 = 3e-5;
@@ -54,6 +55,8 @@ pub(super) struct Patch {
     pub(super) report: Report,
     pub(super) points: Vec<Point>,
     pub(super) triangles: Vec<[Corner; 3]>,
+    /// Whether all edges to points within have a triangle on each side.
+    pub(super) is_plain: bool,
     /// The longest edge that the surface allows.
     pub(super) longest: f64,
     /// Where its curves are to be divided so that its triangles become even.
@@ -77,6 +80,8 @@ impl Patch {
 pub(super) struct Meshed {
     pub(super) points: Vec<Point>,
     pub(super) triangles: Vec<[Corner; 3]>,
+    /// Whether all edges to points within are known to have a triangle on each side: there are no cuts.
+    pub(super) is_plain: bool,
     pub(super) longest: f64,
     /// Triangles below 0.4: at corners of the outline below 15°, and elsewhere.
     pub(super) poor: [usize; 2],
@@ -103,10 +108,10 @@ impl<'a> Task<'a> {
     }
 
     pub(super) fn patch(&self, surface: Surface, mut report: Report, meshed: Meshed) -> Patch {
-        let Meshed { points, triangles, longest, poor, wishes, .. } = meshed;
+        let Meshed { points, triangles, is_plain, longest, poor, wishes, .. } = meshed;
         [report.sharp, report.poor] = poor;
         let splits = if wishes.is_empty() { Vec::new() } else { poor::splits(self.outline, self.rings, &wishes) };
-        Patch { surface, report, points, triangles, longest, splits }
+        Patch { surface, report, points, triangles, is_plain, longest, splits }
     }
 
     /// Fills it.
@@ -161,6 +166,7 @@ impl<'a> Task<'a> {
             report,
             points: Vec::new(),
             triangles: Vec::new(),
+            is_plain: false,
             longest: f64::INFINITY,
             splits: Vec::new(),
         }
@@ -352,9 +358,10 @@ impl<'a> Task<'a> {
             let within = || Corner::Inner(first + number - corners.len() as u32);
             corners.get(number as usize).copied().unwrap_or_else(within)
         };
-        let triangles = improved.lifted.flat.triangles.iter().map(|triangle| triangle.map(corner)).collect();
+        let triangles = improved.lifted.flat.triangles.iter().map(|triangle| triangle.each(corner)).collect();
         let points = added.iter().chain(improved.lifted.points.get(corners.len()..).unwrap_or_default()).copied().collect();
-        Some(Meshed { points, triangles, longest, poor, wishes, is_cut: false, turns_back })
+        let is_plain = added.is_empty();
+        Some(Meshed { points, triangles, is_plain, longest, poor, wishes, is_cut: false, turns_back })
     }
 
     /// Curves fitted, in the direction of the outer loop, and the largest error.

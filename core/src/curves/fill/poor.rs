@@ -9,7 +9,8 @@ use super::layout::{Corner, Rim, Wish};
 use super::lifted::Lifted;
 use super::mesh::of_triangle;
 use super::options::Outline;
-use crate::curves::vector::{distance, dot, sub};
+use crate::curves::vector::{dot, plain_distance, sub};
+use crate::util::each::Each;
 
 /// Twice the ratio of radii below which a triangle is poor.
 const LEAST: f64 = 0.4;
@@ -39,9 +40,9 @@ impl<'a> Angles<'a> {
         for ring in rings {
             let count = ring.len();
             for at in 0..count {
-                let numbers = [at + count - 1, at, at + 1].map(|at| (first + at % count) as u32);
-                let [before, own, next] = numbers.map(|number| lifted.point(number));
-                let product = distance(before, own) * distance(own, next);
+                let numbers = [at + count - 1, at, at + 1].each(|at| (first + at % count) as u32);
+                let [before, own, next] = numbers.each(|number| lifted.point(number));
+                let product = plain_distance(before, own) * plain_distance(own, next);
                 // At the end of a cut or a seam, the surface is whole.
                 let corner = |at: usize| ring.get(at % count).map(|(corner, _)| *corner);
                 let is_end = corner(at + count - 1) == corner(at + 1);
@@ -61,7 +62,7 @@ impl<'a> Angles<'a> {
     pub(super) fn count(&self, lifted: &Lifted<'_>) -> [usize; 2] {
         let mut counts = [0; 2];
         for triangle in &lifted.flat.triangles {
-            let [a, b, c] = triangle.map(|number| lifted.point(number));
+            let [a, b, c] = triangle.each(|number| lifted.point(number));
             if of_triangle(a, b, c) < LEAST {
                 let is_sharp = triangle.iter().any(|number| self.cosine(*number) > SHARP[0]);
                 counts[usize::from(!is_sharp)] += 1;
@@ -87,8 +88,8 @@ impl<'a> Angles<'a> {
             let (count, at) = (ring.len(), *from as usize - first);
             let corner = |at: usize| ring.get(at % count).map(|(corner, _)| *corner);
             let length = |at: usize| {
-                let [a, b] = [at, at + 1].map(|at| lifted.point((first + at % count) as u32));
-                distance(a, b)
+                let [a, b] = [at, at + 1].each(|at| lifted.point((first + at % count) as u32));
+                plain_distance(a, b)
             };
             let mut add = |at: usize, share: f64| {
                 if let (Some(a), Some(b)) = (corner(at), corner(at + 1)) {

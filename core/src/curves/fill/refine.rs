@@ -11,7 +11,8 @@
 use std::collections::{BinaryHeap, VecDeque};
 
 use super::lifted::{End, Lifted, NONE};
-use crate::curves::vector::{Point, cross, distance, dot, norm, sub};
+use crate::curves::vector::{Point, cross, dot, plain_distance, plain_norm, sub};
+use crate::util::each::Each;
 
 /// Twice the ratio of radii below which a triangle is divided: that of angles of 30°, 30° and 120° is 0.4641.
 const GOOD: f64 = 0.46;
@@ -62,7 +63,7 @@ fn sizes(lifted: &Lifted<'_>, longest: f64) -> Vec<f64> {
     let mut around: Vec<(u32, u32, f64)> = Vec::new();
     for edge in 0..3 * lifted.flat.triangles.len() as u32 {
         let [_, a, b] = lifted.around(edge);
-        let length = distance(lifted.point(a), lifted.point(b));
+        let length = plain_distance(lifted.point(a), lifted.point(b));
         around.extend([(a, b, length), (b, a, length)]);
         if lifted.beyond(edge) == NONE {
             for end in [a, b] {
@@ -110,10 +111,10 @@ struct Shape {
 
 impl Shape {
     fn of(lifted: &Lifted<'_>, triangle: u32) -> Self {
-        let [a, b, c] = lifted.corners(triangle).map(|corner| lifted.point(corner));
+        let [a, b, c] = lifted.corners(triangle).each(|corner| lifted.point(corner));
         let (u, v, w) = (sub(c, b), sub(a, c), sub(b, a));
-        let lengths = [u, v, w].map(|side| dot(side, side).sqrt());
-        let double = norm(cross(v, w));
+        let lengths = [u, v, w].each(|side| dot(side, side).sqrt());
+        let double = plain_norm(cross(v, w));
         let [x, y, z] = lengths;
         let (product, around) = (x * y * z, x + y + z);
         let quality = if product > 0.0 { 4.0 * double * double / (product * around) } else { 0.0 };
@@ -134,15 +135,15 @@ impl Shape {
 /// The place at a height above the middle of an edge, on the map, as the edge's triangle is laid there.
 fn above(lifted: &Lifted<'_>, edge: u32, height: f64) -> Option<[f64; 2]> {
     let corners = lifted.around(edge);
-    let [c, a, b] = corners.map(|corner| lifted.point(corner));
+    let [c, a, b] = corners.each(|corner| lifted.point(corner));
     let (along, up) = (sub(b, a), sub(c, a));
     let squared = dot(along, along);
     let foot = dot(up, along) / squared;
-    let high = norm(cross(along, up)) / squared.sqrt();
+    let high = plain_norm(cross(along, up)) / squared.sqrt();
     let third = height / high;
     let second = 0.5 - third * foot;
-    let [p, q, r] = corners.map(|corner| lifted.place(corner));
-    let place = [0, 1].map(|axis| p[axis] * third + q[axis] * (1.0 - second - third) + r[axis] * second);
+    let [p, q, r] = corners.each(|corner| lifted.place(corner));
+    let place = [0, 1].each(|axis| p[axis] * third + q[axis] * (1.0 - second - third) + r[axis] * second);
     place.iter().all(|x| x.is_finite()).then_some(place)
 }
 
@@ -201,7 +202,7 @@ impl State<'_, '_> {
         match settled(self.lifted, triangle, place, clear) {
             Ok((inside, place, point)) => {
                 let corners = self.lifted.corners(inside);
-                let least = |corner: u32| self.size(corner) - DECAY * distance(self.lifted.point(corner), point);
+                let least = |corner: u32| self.size(corner) - DECAY * plain_distance(self.lifted.point(corner), point);
                 let size = corners.into_iter().fold(self.longest, |most, corner| most.max(least(corner)));
                 if self.lifted.insert(inside, place, point, &mut self.changed) {
                     self.sizes.push(size);
@@ -232,8 +233,8 @@ impl State<'_, '_> {
 }
 
 fn length(lifted: &Lifted<'_>, edge: u32) -> f64 {
-    let [_, a, b] = lifted.around(edge).map(|corner| lifted.point(corner));
-    distance(a, b)
+    let [_, a, b] = lifted.around(edge).each(|corner| lifted.point(corner));
+    plain_distance(a, b)
 }
 
 /// Where a place goes: the triangle, the place, and its point; if others are nearer there than `clear`, the edges of rings that are in
@@ -243,8 +244,8 @@ fn settled(lifted: &Lifted<'_>, from: u32, mut place: [f64; 2], mut clear: f64) 
     let mut point = lifted.lift(place);
     let low = |triangle: u32, point: Point, least: f64| {
         (3 * triangle..3 * triangle + 3).find(|edge| {
-            let [_, a, b] = lifted.around(*edge).map(|corner| lifted.point(corner));
-            lifted.beyond(*edge) == NONE && norm(cross(sub(b, a), sub(point, a))) < least * dot(sub(b, a), sub(b, a))
+            let [_, a, b] = lifted.around(*edge).each(|corner| lifted.point(corner));
+            lifted.beyond(*edge) == NONE && plain_norm(cross(sub(b, a), sub(point, a))) < least * dot(sub(b, a), sub(b, a))
         })
     };
     let edge = match end {
@@ -262,7 +263,7 @@ fn settled(lifted: &Lifted<'_>, from: u32, mut place: [f64; 2], mut clear: f64) 
         End::In(triangle) => triangle,
         End::At(other) => return Err([edge, Some(other)]),
     };
-    let is_clear = |corner: u32| distance(lifted.point(corner), point) >= clear;
+    let is_clear = |corner: u32| plain_distance(lifted.point(corner), point) >= clear;
     let across = |edge: u32| Some(lifted.beyond(edge)).filter(|other| *other != NONE).map(|other| lifted.around(other)[0]);
     let is_free =
         lifted.corners(triangle).into_iter().all(is_clear) && (3 * triangle..3 * triangle + 3).filter_map(across).all(is_clear);

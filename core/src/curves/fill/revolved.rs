@@ -9,6 +9,7 @@ use super::spline::SplineSurface;
 use crate::curves::curve::{CurveError, Spline};
 use crate::curves::elementary::Frame;
 use crate::curves::vector::{Point, add, cross, distance, dot, norm, scale, sub, unit};
+use crate::util::each::Each;
 
 /// Samples of a side.
 const SAMPLES: u32 = 8;
@@ -35,7 +36,7 @@ pub(super) fn revolved(coons: &Coons, tolerance: f64) -> Option<SplineSurface> {
 
 /// The frame about whose z-axis one profile turns into the other.
 fn axis(profiles: [&Spline; 2], tolerance: f64) -> Option<Frame> {
-    let points = profiles.map(|side| [0.0, 0.5, 1.0].map(|t| side.point_and_derivative(t).0));
+    let points = profiles.map(|side| [0.0, 0.5, 1.0].each(|t| side.point_and_derivative(t).0));
     let frame = |[a, b, c]: [Point; 3]| {
         let x = unit(sub(c, a))?;
         let z = unit(cross(x, sub(b, a)))?;
@@ -110,7 +111,7 @@ impl<'a> Product<'a> {
     }
 
     fn surface(&self) -> Option<SplineSurface> {
-        let [row, profile] = [self.row, self.profile].map(Spline::points);
+        let [row, profile] = [self.row, self.profile].each(Spline::points);
         if row.len().saturating_mul(profile.len()) > MOST {
             return None;
         }

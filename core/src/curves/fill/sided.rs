@@ -14,13 +14,12 @@ impl Task<'_> {
         let Unfolded { all, is_folded } = self.tried.coons.get_or_init(|| self.unfolded(curves, choices));
         report.is_folded = *is_folded;
         for Sided { coons, lengths, longest } in all {
-            // A dry run needs no outline on the map.
-            let meshed = if self.is_dry {
-                Some(Meshed::dry(self.longest.min(*longest)))
-            } else {
-                self.mesh_within(blend::laid(coons.clone(), lengths, self.rings.first()?), *longest, self.most())
-            };
-            let Some(meshed) = meshed else { continue };
+            // A dry run needs neither the outline on the map nor the surface.
+            if self.is_dry {
+                return Some((Surface::Fallback(Vec::new()), Meshed::dry(self.longest.min(*longest))));
+            }
+            let layout = blend::laid(coons.clone(), lengths, self.rings.first()?);
+            let Some(meshed) = self.mesh_within(layout, *longest, self.most()) else { continue };
             // Triangles that turn back are evidence enough for a closer look.
             if meshed.turns_back && coons.is_folded(FINER) {
                 report.is_folded = true;

@@ -8,6 +8,7 @@ use super::space;
 use crate::curves::curve::{Shape, Spline};
 use crate::curves::elementary::Frame;
 use crate::curves::vector::{Point, cross, distance, dot, norm, sub, unit};
+use crate::util::each::Each;
 
 /// What a curve is.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -83,7 +84,7 @@ impl<'a> Strand<'a> {
     pub(super) fn tangents(&self) -> [Point; 2] {
         let [low, high] = self.shape.domain();
         let near = [(0.0, 1e-4), (1.0 - 1e-4, 1.0)];
-        let mut tangents = [low, high].map(|t| unit(self.shape.derivative(t)));
+        let mut tangents = [low, high].each(|t| unit(self.shape.derivative(t)));
         for (tangent, (from, to)) in tangents.iter_mut().zip(near) {
             *tangent = tangent.or_else(|| unit(sub(self.point(to), self.point(from))));
         }
@@ -121,7 +122,7 @@ impl<'a> Strand<'a> {
         let mut sums = vec![0.0];
         for number in 0..count {
             let step = points.get(number..number + 2).map_or(0.0, |pair| distance(pair[0], pair[1]));
-            let [before, after] = [number, number + 1].map(|number| turn(number.clamp(1, count.max(2) - 1)));
+            let [before, after] = [number, number + 1].each(|number| turn(number.clamp(1, count.max(2) - 1)));
             let bend = before.max(after);
             let sag = if bend > 0.0 { (8.0 * limits.chord / bend).sqrt() } else { f64::INFINITY };
             let longest = limits.size.min(sag).min(limits.angle / bend);
@@ -133,7 +134,7 @@ impl<'a> Strand<'a> {
         let place = |edge: usize| {
             let target = whole * edge as f64 / edges as f64;
             let place = sums.partition_point(|sum| *sum <= target).clamp(1, count) - 1;
-            let [low, high] = [place, place + 1].map(|number| sums.get(number).copied().unwrap_or(whole));
+            let [low, high] = [place, place + 1].each(|number| sums.get(number).copied().unwrap_or(whole));
             let rest = if high > low { (target - low) / (high - low) } else { 0.0 };
             a + (b - a) * (place as f64 + rest) / count as f64
         };

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeSet;
 
+use crate::util::each::Each;
 use spade::handles::{DirectedEdgeHandle, FaceHandle, InnerTag};
 use spade::{CdtEdge, ConstrainedDelaunayTriangulation, Point2, Triangulation};
 
@@ -39,7 +40,7 @@ pub(super) fn triangles(rings: &[Vec<[f64; 2]>]) -> Option<Flat> {
     let mut flat = Flat { places: all, triangles: Vec::new() };
     let faces = cdt.inner_faces().filter(|face| is_in(&is_inside, *face));
     let number = |vertex: usize| numbers.get(vertex).copied().unwrap_or_default();
-    flat.triangles = faces.map(|face| face.vertices().map(|vertex| number(vertex.fix().index()))).collect();
+    flat.triangles = faces.map(|face| face.vertices().each(|vertex| number(vertex.fix().index()))).collect();
     Some(flat)
 }
 
@@ -108,7 +109,7 @@ fn inside(cdt: &Cdt, slits: &BTreeSet<[usize; 2]>) -> Vec<bool> {
         *known = Some(is_inside);
         // Edges of the hull have the outer face at their left.
         let bounds = |edge: Edge<'_>| {
-            let [a, b] = [edge.from(), edge.to()].map(|vertex| vertex.fix().index());
+            let [a, b] = [edge.from(), edge.to()].each(|vertex| vertex.fix().index());
             edge.is_constraint_edge() && !slits.contains(&[a.min(b), a.max(b)])
         };
         let mut cross = |edge: Edge<'_>| stack.push((edge.rev().face().fix(), is_inside != bounds(edge)));

@@ -23,6 +23,10 @@ pub(crate) const REPAIR: Repair = Repair {
     name: RepairName::ToleranceWeld,
     changes: Changes::Surface,
     run: |cx| {
+        // The mesh as it came was looked at already.
+        if cx.work.version() == 0 && cx.before.weldable_vertices == 0 {
+            return Ok(Done::count(0, NOTE));
+        }
         let welded = weld(cx.survey, &mut cx.work, cx.tolerance);
         if welded.taken_back > 0 {
             tracing::info!(clusters = welded.taken_back, "Welds taken back, since they made an edge of more than two triangles.");

@@ -94,10 +94,6 @@ impl Work {
     }
 
     /// The quadric's value by its weight, the cost, and the best place for the vertex that two become. The first one is no freer than the second.
-    ///
-    /// The cost is the value by the root of its weight. By the value itself, flat places, whose vertices stand for many planes, stay fine, and curved ones
-    /// pay for that; by the value by its weight, some places go too far in the end. Where a fifth is left of bumpy rings of 10 k and 100 k triangles, the
-    /// largest distance is by this cost between 12 % less and 0.2 % more than by the value itself (measured, five meshes).
     #[inline]
     fn price(&self, [u, v]: [u32; 2]) -> Option<(f64, f64, Point)> {
         let (patch, [i, j]) = (&self.patch, [u as usize, v as usize]);
@@ -109,11 +105,9 @@ impl Work {
         let edge = place(patch.points[j]) - from;
         let sum = patch.quadrics[i].wide().plus(&patch.quadrics[j].wide().around(-edge));
         let share = sum.weight().max(1.0).recip();
-        let scale = share.sqrt();
         let cost = |x: DVec3| {
             let value = sum.at(x);
-            let short = STABILITY * STABILITY * (x.length_squared() + (x - edge).length_squared());
-            (value * share, (value + short) * scale)
+            (value * share, value + STABILITY * STABILITY * (x.length_squared() + (x - edge).length_squared()))
         };
         if kinds[0] != kinds[1] {
             let (x, point) = if kinds[0] > kinds[1] { (DVec3::ZERO, patch.points[i]) } else { (edge, patch.points[j]) };

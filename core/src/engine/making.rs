@@ -6,6 +6,7 @@
 use std::path::Path;
 
 use crate::contract::error::Result;
+use crate::contract::settings::Limits;
 use crate::engine::clock::Clock;
 use crate::engine::copying;
 use crate::engine::files::{self, Made};
@@ -22,14 +23,13 @@ use crate::output::emit::{self, Content};
 /// [`crate::Error`], any of them.
 pub(crate) fn make(mesh: MeshFile, output: &Path, is_of_target: bool, work: Work<'_>, clock: &mut Clock) -> Result<Made> {
     let Work { profile, limits, progress } = work;
-    let plain =
-        |mesh, output: &Path, clock: &mut Clock| files::make(mesh, output, is_of_target, (profile, limits), progress, clock);
     let steps = shaping::steps(profile);
     if steps.is_empty() {
-        return plain(mesh, output, clock);
+        return files::make(mesh, output, is_of_target, (profile, limits), progress, clock);
     }
     let mut spool = Nameless::new(limits)?;
-    let mut made = plain(mesh, &spool.path(), clock)?;
+    let mut made = files::make(mesh, &spool.path(), is_of_target, (profile, &of_spools(limits)), progress, clock)?;
+    made.report.limits.defer_sync = limits.defer_sync;
     if made.report.output.is_none() {
         return Ok(made);
     }
@@ -57,6 +57,11 @@ pub(crate) fn make(mesh: MeshFile, output: &Path, is_of_target: bool, work: Work
     Ok(made)
 }
 
+/// The limits for spools: these need not be on the disk, since nobody finds them after a fall of the machine.
+fn of_spools(limits: &Limits) -> Limits {
+    Limits { defer_sync: true, ..limits.clone() }
+}
+
 /// Writes the changed mesh, if it changes and is no worse then; completes the report and the edit.
 fn changed(mesh: &MeshFile, (step, mut change): (&Step, Change), made: &mut Made, work: Work<'_>) -> Result<Option<Nameless>> {
     let Work { profile, limits, progress } = work;
@@ -68,7 +73,7 @@ fn changed(mesh: &MeshFile, (step, mut change): (&Step, Change), made: &mut Made
     let own = Edit::default().then(mesh.records(), &change.gone, std::mem::take(&mut change.added), step.repair());
     let spool = Nameless::new(limits)?;
     let path = spool.path();
-    emit::draft(mesh, &path, limits, progress, |draft| draft.finish(&Content::Edited(&own)))?.0.durable()?;
+    emit::draft(mesh, &path, &of_spools(limits), progress, |draft| draft.finish(&Content::Edited(&own)))?.0.durable()?;
     let written = files::open(&path, limits, progress)?.called(mesh.path());
     change.added = own.into_added();
     let judged = files::look(&written, (profile, limits), progress, &mut Clock::start())?;

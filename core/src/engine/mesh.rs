@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use crate::io::read::MAX_TRIANGLES;
 use crate::io::record::{self, Record};
-use crate::topology::vertex_table::Weld;
+use crate::topology::vertex_table::{BATCH, Weld};
 use crate::util::parallel;
 use crate::util::words::Count;
 
@@ -71,23 +71,32 @@ impl Mesh {
         if triangles.len() as u64 > MAX_TRIANGLES {
             return Err(MeshError::TooManyFaces { faces: triangles.len() });
         }
-        Self::welded(triangles.iter().copied())
+        Self::welded(triangles)
     }
 
-    fn welded(triangles: impl ExactSizeIterator<Item = [[f32; 3]; 3]>) -> Result<Self, MeshError> {
+    fn welded(triangles: &[[[f32; 3]; 3]]) -> Result<Self, MeshError> {
         let mut weld = Weld::default();
         weld.reset(triangles.len() / 2);
         let mut faces = Vec::with_capacity(triangles.len());
         let mut apart: Vec<(usize, usize, [f32; 3])> = Vec::new();
-        for (face, corners) in triangles.enumerate() {
-            let is_finite = |p: [f32; 3]| p.iter().all(|x| x.is_finite());
-            faces.push(std::array::from_fn(|k| {
-                if is_finite(corners[k]) {
-                    return weld.vertex(corners[k]);
-                }
-                apart.push((face, k, corners[k]));
-                0
-            }));
+        let is_finite = |p: &[f32; 3]| p.iter().all(|x| x.is_finite());
+        for group in triangles.chunks(BATCH / 3) {
+            if group.as_flattened().iter().all(is_finite) {
+                let mut vertices = [0; BATCH];
+                weld.vertices(group.as_flattened(), &mut vertices);
+                faces.extend(vertices.as_chunks().0.iter().take(group.len()));
+                continue;
+            }
+            for corners in group {
+                let face = faces.len();
+                faces.push(std::array::from_fn(|k| {
+                    if is_finite(&corners[k]) {
+                        return weld.vertex(corners[k]);
+                    }
+                    apart.push((face, k, corners[k]));
+                    0
+                }));
+            }
         }
         let mut vertices = weld.into_positions();
         let count = vertices.len() + apart.len();

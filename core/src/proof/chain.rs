@@ -43,7 +43,7 @@ pub(super) struct Lent {
 
 /// Appends what is between two ends; false if no short way was found.
 pub(super) fn between(surface: &Surface<'_>, [a, b]: [&Pair; 2], aim: f64, lent: &mut Lent, out: &mut Vec<Pair>) -> bool {
-    if surface.common([&a.spot, &b.spot].into_iter()).is_some() {
+    if surface.common([&a.spot, &b.spot]).is_some() {
         return true;
     }
     if let Some(pair) = over(surface, [a, b], aim) {

@@ -33,7 +33,7 @@ impl Shared {
 
     #[inline]
     fn of(surface: &Surface<'_>, [a, b]: [&Spot; 2]) -> Self {
-        let Some(face) = surface.common([a, b].into_iter()) else { return Self::NO };
+        let Some(face) = surface.common([a, b]) else { return Self::NO };
         let (Some(a), Some(b)) = (surface.within(a, face), surface.within(b, face)) else { return Self::NO };
         let is_out = [0, 1, 2].map(|k: usize| a[k] == 0.0 && b[k] == 0.0);
         match is_out {

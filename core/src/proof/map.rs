@@ -77,9 +77,7 @@ impl Map<'_> {
             return;
         };
         let farthest = a.1.max(b.1).max(c.1);
-        if let Some(common) =
-            self.surface.common([&a.0, &b.0, &c.0].into_iter()).filter(|_| self.keeps_rim(face, [a.0, b.0, c.0]))
-        {
+        if let Some(common) = self.surface.common([&a.0, &b.0, &c.0]).filter(|_| self.keeps_rim(face, [a.0, b.0, c.0])) {
             add(self.surface, self.covered, common, &[a.0, b.0, c.0]);
             if farthest > self.aim {
                 found.failed.push(f as u32);
@@ -190,7 +188,7 @@ impl Map<'_> {
         let mut spots = vec![from.spot];
         spots.extend(between.iter().map(|pair| pair.spot));
         spots.push(to.spot);
-        spots.windows(2).filter_map(|two| self.surface.common(two.iter())).collect()
+        spots.array_windows().filter_map(|[a, b]| self.surface.common([a, b])).collect()
     }
 
     /// Cuts a triangle that does not go into one face into pieces, in `lent`; returns how far its farthest corner or cut goes, if it can be mapped.

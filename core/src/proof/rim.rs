@@ -101,7 +101,7 @@ fn edges_at<'s>(surface: &'s Surface<'_>, v: u32) -> impl Iterator<Item = (u32, 
 
 /// Do two spots lie on one edge?
 pub(super) fn on_edge(surface: &Surface<'_>, spots: &[Spot; 2]) -> bool {
-    let Some(face) = surface.common(spots.iter()) else { return false };
+    let Some(face) = surface.common(spots.each_ref()) else { return false };
     let [Some(a), Some(b)] = [surface.within(&spots[0], face), surface.within(&spots[1], face)] else { return false };
     (0..3).any(|k| a[k] == 0.0 && b[k] == 0.0)
 }

@@ -117,14 +117,14 @@ impl<'a> Surface<'a> {
 
     /// A face in which all these spots lie.
     #[inline]
-    pub(super) fn common<'s>(&self, spots: impl Iterator<Item = &'s Spot> + Clone) -> Option<u32> {
-        let first = spots.clone().next()?;
-        if spots.clone().all(|spot| spot.face == first.face) {
+    pub(super) fn common<const N: usize>(&self, spots: [&Spot; N]) -> Option<u32> {
+        let first = spots.first()?;
+        if spots.iter().all(|spot| spot.face == first.face) {
             return Some(first.face);
         }
-        let holds = |face: u32| spots.clone().all(|spot| self.within(spot, face).is_some());
+        let holds = |face: u32| spots.iter().all(|spot| self.within(spot, face).is_some());
         // Where one lies inside a face, there is no other one; else all are around a vertex of the first.
-        if let Some(inner) = spots.clone().find(|spot| spot.is_inner()) {
+        if let Some(inner) = spots.iter().find(|spot| spot.is_inner()) {
             return holds(inner.face).then_some(inner.face);
         }
         if holds(first.face) {

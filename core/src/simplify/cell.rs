@@ -206,39 +206,38 @@ impl Work {
     pub(super) fn is_crossed(&self, vertices: &[u32], was: &Patch) -> bool {
         let patch = &self.patch;
         let faces: Vec<(usize, [u32; 3])> = patch.faces().collect();
-        let triangles: Vec<Triangle> =
-            faces.iter().map(|(_, face)| patch.triangle(*face)).chain(self.obstacles.iter().map(|o| o.1)).collect();
-        let boxes: Vec<Bounds> = triangles.iter().map(|t| Bounds::of(t)).collect();
         let has_moved = |v: u32| patch.points[v as usize] != was.points[v as usize];
-        let is_changed =
-            |i: usize| faces.get(i).is_some_and(|(f, face)| was.face(*f) != *face || face.iter().any(|v| has_moved(*v)));
-        if !(0..faces.len()).any(is_changed) {
+        let is_changed: Vec<bool> =
+            faces.iter().map(|(f, face)| was.face(*f) != *face || face.iter().any(|v| has_moved(*v))).collect();
+        let changed: Vec<usize> = (0..faces.len()).filter(|i| is_changed[*i]).collect();
+        if changed.is_empty() {
             return false;
         }
-        let changed: Vec<bool> = (0..triangles.len()).map(is_changed).collect();
+        let triangles: Vec<Triangle> =
+            faces.iter().map(|(_, face)| patch.triangle(*face)).chain(self.obstacles.iter().map(|o| o.1)).collect();
         let number = |i: usize| match faces.get(i) {
             Some((_, face)) => face.map(|v| vertices[v as usize]),
             None => self.obstacles[i - faces.len()].0,
         };
+        // Later rounds change few triangles: the tree is of these alone, and all others look into it.
+        let boxes: Vec<Bounds> = changed.iter().map(|i| Bounds::of(&triangles[*i])).collect();
         let tree = BoxTree::new(&boxes);
-        let mut found = false;
-        for i in (0..faces.len()).filter(|i| changed[*i]) {
-            let own = faces[i].1;
-            tree.each_meeting(&boxes[i], |j| {
-                let j = j as usize;
+        (0..triangles.len()).any(|j| {
+            let (other, at) = (number(j), &triangles[j]);
+            let is_changed = is_changed.get(j).copied().unwrap_or(false);
+            let mut found = false;
+            tree.each_meeting(&Bounds::of(at), |i| {
+                let i = changed[i as usize];
                 // Of two changed ones, the second looks.
-                if found || j == i || (changed[j] && j > i) {
+                if found || j == i || (is_changed && j > i) {
                     return;
                 }
-                let (other, at) = (number(j), &triangles[j]);
                 let is_on =
                     |v: u32| at.iter().zip(other).any(|(p, w)| *p == patch.points[v as usize] && w != vertices[v as usize]);
-                found = own.iter().any(|v| (changed[j] || has_moved(*v)) && is_on(*v)) || do_cross(&triangles[i], at);
+                let own = faces[i].1;
+                found = own.iter().any(|v| (is_changed || has_moved(*v)) && is_on(*v)) || do_cross(&triangles[i], at);
             });
-            if found {
-                return true;
-            }
-        }
-        false
+            found
+        })
     }
 }

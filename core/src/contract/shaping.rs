@@ -22,6 +22,9 @@ pub struct Residue {
     /// reaches none. `None` without a path.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub path_fit: Option<f64>,
+    /// The axes of the mesh that those of the path are, as `y, -x, z`, where the path fits the mesh so and not as it is. The outcome is `needs_review` then.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub path_axes: Option<String>,
     /// Oddities of the tool path, with their lines (at most 20).
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub findings: Vec<String>,

@@ -2,6 +2,7 @@
 
 use super::cuts::{Family, families};
 use super::found::{Fit, Found, Kind, Mesh, RegionReport};
+use super::frame::{self, Frame, SAMPLES};
 use super::intended::{Limits, Scratch, Verdict, judge};
 use super::options::{Corrections, Error, Options};
 use super::regions::{clean, neighbours, pieces};
@@ -81,6 +82,27 @@ pub fn find(mesh: Mesh<'_>, moves: &Moves, tools: &[Tool], options: &Options<'_>
         .height_min
         .unwrap_or_else(|| limits.iter().map(|limits| HEIGHT_LEAST * limits.tolerance).fold(f64::INFINITY, f64::min));
     regions(mesh, (marks, fit), height_min, options)
+}
+
+/// The axes of the path, where those of the mesh are not: the one exchange or turn of axes with which the path fits the mesh; `None` if there is no such
+/// one, or several. Looks at some vertices alone. O(vertices + log moves).
+///
+/// # Errors
+/// [`Error`].
+pub fn frame(mesh: Mesh<'_>, moves: &Moves, tools: &[Tool], options: &Options<'_>) -> Result<Option<Frame>, Error> {
+    check(mesh, options)?;
+    let families = families(moves, tools, options.go_on)?;
+    let limits: Vec<Limits> = families.iter().map(|family| limits(mesh, family, options)).collect();
+    let step = mesh.points.len().div_ceil(SAMPLES).max(1);
+    let sample: Vec<[f32; 3]> = mesh.points.iter().step_by(step).copied().collect();
+    let frames: Vec<Frame> = Frame::all().collect();
+    let fit = |frame: &Frame| {
+        let points: Vec<[f32; 3]> = sample.iter().map(|point| frame.into_path(*point)).collect();
+        let mut marks = vec![Mark::OUT; points.len()];
+        (*frame, block(&points, &families, &limits, (&mut marks, &mut Scratch::default())))
+    };
+    let fits: Vec<(Frame, Fit)> = frames.par_iter().map(fit).collect();
+    Ok(frame::clear(&fits, sample.len()))
 }
 
 pub(super) fn check(mesh: Mesh<'_>, options: &Options<'_>) -> Result<(), Error> {

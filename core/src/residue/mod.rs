@@ -13,6 +13,7 @@ mod brush;
 mod cuts;
 mod find;
 mod found;
+mod frame;
 mod intended;
 mod options;
 mod profile;
@@ -27,8 +28,9 @@ mod waves;
 mod tests;
 
 pub use brush::{Brush, BrushError};
-pub use find::find;
+pub use find::{find, frame};
 pub use found::{Fit, Found, Kind, Mesh, RegionReport};
+pub use frame::{FIT_LEAST, Frame};
 pub use options::{Corrections, Error, Options, Region};
 pub use repair::{Repaired, repair};
 pub use spectrum::{Hint, hint};

@@ -125,6 +125,21 @@ fn a_path_of_another_part_is_noticed() {
     }
 }
 
+/// A mesh with Y up and its path with Z up: the path is turned, which the report says, and a person has to look.
+#[test]
+fn a_mesh_with_another_axis_up_is_noticed() {
+    let (place, part) = milled();
+    let turned = |triangle: Triangle| triangle.map(|[x, y, z]| [x, z, -y]);
+    let back = |triangle: &Triangle| triangle.map(|[x, y, z]| [x, -z, y]);
+    place.put("in.stl", &stl::mesh(&part.triangles().map(turned).collect::<Vec<_>>()));
+    let told = run(&place, &with_path(&case().cutter.words(), &[]), 1);
+    assert_eq!((&told["residue"]["path_axes"], &told["outcome"]), (&Value::from("x, -z, y"), &Value::from("needs_review")));
+    let after: Vec<Triangle> =
+        stl::records(&place.read("out.stl")).iter().map(stl::corners).map(|corners| back(&corners)).collect();
+    let verdict = cut::judge(case(), &part, &after);
+    assert!(verdict.triangles > 0 && verdict.height_after < 0.2 * part.height && verdict.off < 0.5 * part.height, "{verdict:?}");
+}
+
 /// Files that are no corrections are named in one line: before any work where that can be seen, else in the report, and the mesh stays.
 #[test]
 fn corrections_that_are_none_are_named() {

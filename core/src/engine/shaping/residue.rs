@@ -7,7 +7,7 @@ use super::corrections::{self, FromFiles, Origins};
 use crate::contract::report::{MOST_LISTED, Outcome, Report, Residue, ResidueRegion, ResidueSuspect};
 use crate::engine::mesh::Mesh;
 use crate::engine::work::Work;
-use crate::residue::{self, Corrections, Fit, Found, Kind, Repaired};
+use crate::residue::{self, Corrections, FIT_LEAST, Fit, Found, Frame, Kind, Repaired};
 use crate::simplify::{self, Input, Options};
 use crate::smooth;
 use crate::toolpath::{self, Program, Tool, project, tools};
@@ -17,9 +17,7 @@ use crate::util::words::Counted;
 const SHARE: f64 = 0.2;
 /// Of the lowest region's height, the simplified surface may be so far from the moved one.
 const OFF: f64 = 0.5;
-/// The least share of vertices where the tool left the material ([`Fit::share`]) with which a path counts as the mesh's own.
-const FIT_LEAST: f64 = 0.5;
-/// The share below which a person has to look.
+/// The share of vertices where the tool left the material ([`Fit::share`]) below which a person has to look.
 const FIT_GOOD: f64 = 0.9;
 /// Oddities of a path that are listed.
 const FINDINGS: usize = 20;
@@ -68,6 +66,13 @@ pub(super) fn put(told: Residue, report: &mut Report) {
             }
         });
     }
+    if let Some(axes) = told.path_axes.as_ref().filter(|_| report.verdict.good) {
+        report.outcome = Outcome::NeedsReview;
+        report
+            .verdict
+            .reasons
+            .push(format!("the tool path fits the mesh only with other axes: its x, y, z are {axes} of the mesh"));
+    }
     if let Some(share) = told.path_fit.filter(|share| *share < FIT_GOOD && report.verdict.good) {
         report.outcome = Outcome::NeedsReview;
         let share = format!("{:.0} % of the vertices that the tool reaches lie where it left the material", 100.0 * share);
@@ -97,13 +102,14 @@ fn removed(mesh: &Mesh, options: &residue::Options<'_>, work: Work<'_>) -> Resul
     let program = program(Path::new(&settings.toolpath), &settings.tools)?;
     let view = residue::Mesh { points: mesh.vertices(), faces: mesh.faces() };
     let named = |error: residue::Error| format!("{}: {error}", settings.toolpath);
-    let found = residue::find(view, &program.moves, &program.header.tools, options).map_err(named)?;
+    let (found, frame) = found(view, &program, options).map_err(named)?;
     if let Some(why_not) = misfit(found.fit) {
         let told = Residue { why_not: Some(why_not), path_fit: Some(found.fit.share()), ..Residue::default() };
         return Ok(Change { gone: Vec::new(), added: Vec::new(), told: Told::Residue(told) });
     }
     let repaired = residue::repair(view, &found, options).map_err(named)?;
     let mut told = told(&found, &program);
+    told.path_axes = frame.map(|frame| frame.to_string());
     if told.triangles_before == 0 {
         return Ok(Change { gone: Vec::new(), added: Vec::new(), told: Told::Residue(told) });
     }
@@ -139,6 +145,29 @@ fn program(path: &Path, listed: &[String]) -> Result<Program, String> {
         }
         other => other.map_err(|error| format!("{shown}: {error}")),
     }
+}
+
+/// Residue in the axes of the mesh, and in which frame the path fits, if not as it is.
+fn found(
+    view: residue::Mesh<'_>,
+    program: &Program,
+    options: &residue::Options<'_>,
+) -> Result<(Found, Option<Frame>), residue::Error> {
+    let (moves, tools) = (&program.moves, &program.header.tools);
+    let found = residue::find(view, moves, tools, options)?;
+    if found.fit.share() >= FIT_LEAST {
+        return Ok((found, None));
+    }
+    let Some(frame) = residue::frame(view, moves, tools, options)? else { return Ok((found, None)) };
+    let points: Vec<[f32; 3]> = view.points.iter().map(|point| frame.into_path(*point)).collect();
+    let faces: Vec<[u32; 3]> = view.faces.iter().map(|face| frame.face(*face)).collect();
+    let boxes = |boxes: &[residue::Region]| boxes.iter().map(|one| frame.of_box(*one)).collect::<Vec<_>>();
+    let [include, exclude] = [options.corrections.include, options.corrections.exclude].map(boxes);
+    let corrections = Corrections { include: &include, exclude: &exclude, ..options.corrections };
+    let options = residue::Options { corrections, ..options.clone() };
+    let mut found = residue::find(residue::Mesh { points: &points, faces: &faces }, moves, tools, &options)?;
+    found.targets.iter_mut().for_each(|target| *target = frame.into_mesh(*target));
+    Ok((found, Some(frame)))
 }
 
 /// The moved mesh with fewer triangles in its regions.

@@ -107,21 +107,23 @@ fn a_brush_has_the_numbers_of_the_input() {
     assert_eq!(before(&told), 0, "{told}");
 }
 
-/// A path that did not cut this mesh is noticed, and the mesh stays as it is to the bit: one that goes half a step beside the cuts and a little lower, and
-/// one that is elsewhere.
+/// A path that did not cut this mesh is noticed, and the mesh stays as it is to the bit: the cuts of one are half a step beside its path and a little higher,
+/// and the other is elsewhere.
 #[test]
 fn a_path_of_another_part_is_noticed() {
     let (place, part) = milled();
     let tool = case().cutter.words();
     let fit = run(&place, &with_path(&tool, &[]), 0)["residue"]["path_fit"].as_f64();
     assert!(fit > Some(0.99), "{fit:?}");
-    for (offset, words) in [("G52 X0.5 Z-0.2", "lie where it left the material"), ("G52 X500", "reaches no vertex of the mesh")] {
-        place.put("in.nc", format!("{offset}\n{}", part.code).as_bytes());
+    for (by, words) in [([0.5, 0.0, 0.2], "lie where it left the material"), ([500.0, 0.0, 0.0], "reaches no vertex of the mesh")]
+    {
+        let moved = |triangle: Triangle| triangle.map(|point| [0, 1, 2].map(|axis| point[axis] + by[axis]));
+        place.put("in.stl", &stl::mesh(&part.triangles().map(moved).collect::<Vec<_>>()));
         let told = run(&place, &with_path(&tool, &[]), 1);
         let residue = &told["residue"];
-        assert!(residue["why_not"].as_str().is_some_and(|why| why.contains(words)), "{offset}: {residue}");
-        assert!(residue["path_fit"].as_f64() < Some(0.5) && told["outcome"] == "needs_review", "{offset}: {residue}");
-        assert!(place.read("out.stl") == place.read("in.stl"), "{offset}");
+        assert!(residue["why_not"].as_str().is_some_and(|why| why.contains(words)), "{by:?}: {residue}");
+        assert!(residue["path_fit"].as_f64() < Some(0.5) && told["outcome"] == "needs_review", "{by:?}: {residue}");
+        assert!(place.read("out.stl") == place.read("in.stl"), "{by:?}");
     }
 }
 

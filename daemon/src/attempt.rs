@@ -13,6 +13,7 @@ use crossbeam::channel::Sender;
 use suture_core::{ErrorClass, Profile, Report};
 use suture_store::Lease;
 use suture_store::job::{Duty, Kind, Withdrawal};
+use suture_store::patience::brief;
 use suture_store::{Claim, Job, JobId, JobStore, State, Step, StoreError, crash_point};
 
 use crate::beside;
@@ -131,7 +132,11 @@ impl Context {
     }
 
     fn waits(&self) -> Result<Waits, StoreError> {
-        Waits::of(&*self.store, self.settings.now().large)
+        // Whoever asks has the schedule, which others need; and an idle slot has nothing to lose by a database that is away.
+        match brief(|| Waits::of(&*self.store, self.settings.now().large)) {
+            Err(StoreError::Away { .. }) => Ok(Waits::default()),
+            waits => waits,
+        }
     }
 
     fn halted(&self) -> bool {
@@ -381,7 +386,7 @@ impl Slot {
             if now.duration_since(asked.get()) >= ASK_EVERY {
                 asked.set(now);
                 // A store that fails here fails at the next step too, and is dealt with there.
-                lease.set(context.store.heartbeat(claim).unwrap_or(Lease::Held));
+                lease.set(brief(|| context.store.heartbeat(claim)).unwrap_or(Lease::Held));
             }
             lease.get() != Lease::Held || context.halted()
         };

@@ -6,8 +6,8 @@ use std::time::Duration;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
-use suture_store::Priority;
 use suture_store::job::Kind;
+use suture_store::{Address, Priority};
 
 use crate::units::{parse_duration, parse_listen, parse_size};
 use meshes::{ConvertArgs, DefeatureArgs, FillCurvesArgs, InspectArgs, RepairArgs, ResidueArgs, SimplifyArgs, SmoothArgs};
@@ -77,7 +77,7 @@ pub(crate) enum Command {
     Retention(RetentionArgs),
     /// List, show, retry, rank or cancel the jobs of a hot folder, with or without a running daemon
     Jobs(JobsArgs),
-    /// Check every record of a hot folder's job store, or write all of its jobs as JSON
+    /// Check a job store, write its jobs as JSON, move it into a database that many machines share, or out of one
     Store(StoreArgs),
     /// Show how a hot folder's daemon stands: its queue, what is in work, what ended last, what keeps it from work
     Status(StatusArgs),
@@ -194,6 +194,10 @@ pub(crate) struct WatchArgs {
     /// How long a file must be at rest before it is taken, e.g. 5s
     #[arg(long, value_name = "TIME", value_parser = parse_duration)]
     pub settle: Option<Duration>,
+    /// Keep the jobs in this PostgreSQL database, which daemons on other machines may share, e.g. postgres://farm@db/suture; the password comes from
+    /// PGPASSWORD or ~/.pgpass
+    #[arg(long, value_name = "URL", value_parser = Address::parse)]
+    pub store: Option<Address>,
     /// Serve the HTTP interface here, e.g. 127.0.0.1:7878; beyond this machine only with tokens, which a configuration names
     #[arg(long, value_name = "ADDR", value_parser = parse_listen)]
     pub listen: Option<SocketAddr>,
@@ -266,6 +270,9 @@ pub(crate) struct JobsArgs {
     /// The hot folder
     #[arg(long, value_name = "DIR", default_value = ".", global = true)]
     pub dir: PathBuf,
+    /// All jobs of this shared store, of whatever folder and machine, without asking a daemon
+    #[arg(long, value_name = "URL", value_parser = Address::parse, global = true)]
+    pub store: Option<Address>,
     /// Print JSON
     #[arg(long, global = true)]
     pub json: bool,

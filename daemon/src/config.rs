@@ -7,7 +7,7 @@ use std::path::{Component, Path, PathBuf};
 use std::time::Duration;
 
 use suture_core::Profile;
-use suture_store::Priority;
+use suture_store::{Address, Priority};
 
 use crate::own_profile::OwnProfile;
 use crate::units::show_size;
@@ -22,6 +22,7 @@ pub(crate) mod command;
 pub(crate) mod events;
 pub(crate) mod keep;
 pub(crate) mod read;
+mod shared;
 pub(crate) mod show;
 pub(crate) mod taken;
 
@@ -82,8 +83,10 @@ impl TimeLimit {
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Config {
     pub folders: Vec<FolderConfig>,
-    /// Where the job store is.
+    /// What is this machine's own: the job store, unless `store` names another one.
     pub state: PathBuf,
+    /// The database that holds the jobs, and that other daemons share.
+    pub store: Option<Address>,
     /// Small files at a time, one thread each.
     pub workers: usize,
     /// Threads for one large file.
@@ -121,6 +124,7 @@ impl Config {
         let limits = suture_core::Limits::default();
         Self {
             state: default_state(dir),
+            store: None,
             folders: vec![FolderConfig::of(dir)],
             workers: 2,
             threads: limits.threads,

@@ -14,6 +14,7 @@ use std::time::Duration;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
+use suture_store::patience::brief;
 use suture_store::{Control, Decision, Ending, Job, JobId, JobStore, Kind, Priority, Query, StoreError, Verdict};
 
 use crate::attempt::Context;
@@ -357,7 +358,7 @@ impl Drop for Door {
 
 /// Serves one who knocked, and sees them off.
 fn attend(context: &Context, stream: &UnixStream, patience: Duration) {
-    if let Err(error) = serve_one(context, stream, patience) {
+    if let Err(error) = brief(|| serve_one(context, stream, patience)) {
         tracing::debug!(%error, "A request on the control socket was not understood.");
     }
     // Whoever asked reads to the end, and another handle of the stream is kept.

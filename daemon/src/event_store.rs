@@ -186,4 +186,12 @@ impl JobStore for Heard {
     fn counts(&self) -> Result<Vec<(Kind, u64)>, StoreError> {
         self.read(self.store.counts())
     }
+
+    fn away(&self) -> Option<Time> {
+        self.store.away()
+    }
+
+    fn hear(&self, news: Arc<dyn Fn() + Send + Sync>) {
+        self.store.hear(news);
+    }
 }

@@ -12,7 +12,7 @@ use crate::course::show_whole;
 use crate::folder::Folder;
 use crate::say::plain;
 use crate::schedule::{Hold, Standing};
-use crate::units::show_count;
+use crate::units::{show_count, show_when};
 
 /// So many jobs of a sort are named.
 const NAMED: usize = 5;
@@ -116,8 +116,8 @@ impl Glance {
         })
     }
 
-    /// Of these jobs, of a store that no daemon has.
-    pub(crate) fn of_jobs(mut jobs: Vec<Job>, held: Vec<String>, state: &Path) -> Self {
+    /// Of these jobs, of a store that no daemon has; of a shared one no room on a disk is known.
+    pub(crate) fn of_jobs(mut jobs: Vec<Job>, held: Vec<String>, state: Option<&Path>) -> Self {
         let mut counts: BTreeMap<Kind, u64> = Kind::ALL.map(|kind| (kind, 0)).into();
         jobs.iter().for_each(|job| *counts.entry(job.kind()).or_default() += 1);
         jobs.retain(|job| job.kind().is_at_rest());
@@ -129,7 +129,7 @@ impl Glance {
             jobs: counts,
             last: latest(jobs.into_iter().take(LATEST).collect()),
             review,
-            store_bytes: size_of(state),
+            store_bytes: state.map_or(0, size_of),
             ..Self::default()
         }
     }
@@ -200,10 +200,18 @@ pub(crate) fn standing(context: &Context) -> Result<Standing, StoreError> {
     Ok(Standing { away, full, untold, ..context.schedule.standing() })
 }
 
+/// That the job database does not answer, and since when, in words.
+pub(crate) fn away(context: &Context) -> Option<String> {
+    context.store.away().map(|since| format!("the job database has not answered since {}", show_when(since.0)))
+}
+
 /// Why the daemon is not ready for files, in words.
 pub(crate) fn unready(context: &Context) -> Option<String> {
     if context.pulse.is_ending() {
         return Some("the daemon ends".into());
+    }
+    if let Some(why) = away(context) {
+        return Some(why);
     }
     if context.has_failed() || context.store.check().is_err() {
         return Some("the job store is to be opened again".into());

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use suture_core::Report;
 use suture_store::job::Kind;
-use suture_store::{Decision, Job, JobId, State, Verdict};
+use suture_store::{Address, Decision, Job, JobId, State, Verdict};
 
 use crate::cli::{JobsArgs, JobsCommand, Said};
 use crate::control::{DaemonWish, JobsWish};
@@ -43,7 +43,11 @@ pub(crate) fn run(args: &JobsArgs) -> Exit {
         },
         JobsCommand::Priority { id, priority } => JobsWish::Rank(JobId(*id), *priority),
     };
-    let mut jobs = match reach::jobs(&args.dir, &wish) {
+    let asked = match &args.store {
+        Some(address) => reach::shared_jobs(address, &wish),
+        None => reach::jobs(&args.dir, &wish),
+    };
+    let mut jobs = match asked {
         Ok(jobs) => jobs,
         Err(failure) => return fail(&failure),
     };
@@ -57,7 +61,9 @@ pub(crate) fn run(args: &JobsArgs) -> Exit {
         jobs.retain(|job| state.is_none_or(|state| job.kind() == state));
         jobs.drain(..jobs.len().saturating_sub(newest.unwrap_or(usize::MAX)));
     }
-    let work = at_work(&args.dir, &jobs);
+    // A daemon knows of its own work alone.
+    let is_shared = args.store.is_some();
+    let work = if is_shared { Vec::new() } else { at_work(&args.dir, &jobs) };
     let mut text = String::new();
     for job in &jobs {
         let work = work_of(job, &work);
@@ -72,14 +78,20 @@ pub(crate) fn run(args: &JobsArgs) -> Exit {
     } else if let (JobsCommand::List { .. }, false) = (&args.command, args.json) {
         text += &format!("{summary}\n");
     }
-    if let (JobsCommand::List { .. }, false) = (&args.command, args.json) {
-        let Standing { held, away, full, untold, .. } = standing(&args.dir);
-        text.extend(held.iter().map(|why| format!("nothing new is taken: {why}\n")));
-        text.extend(untold.iter().map(|who| format!("not told yet: {}\n", plain(who))));
-        text.extend(away.iter().map(|why| format!("out of reach: {}\n", plain(why))));
-        text.extend(full.iter().map(|why| format!("disk full: {}\n", plain(why))));
+    if let (JobsCommand::List { .. }, false, false) = (&args.command, args.json, is_shared) {
+        text += &trouble(&args.dir);
     }
     print(text.as_bytes(), Exit::Good)
+}
+
+/// What keeps a daemon from work, in lines.
+fn trouble(dir: &Path) -> String {
+    let Standing { held, away, full, untold, .. } = standing(dir);
+    let mut text: String = held.iter().map(|why| format!("nothing new is taken: {why}\n")).collect();
+    text.extend(untold.iter().map(|who| format!("not told yet: {}\n", plain(who))));
+    text.extend(away.iter().map(|why| format!("out of reach: {}\n", plain(why))));
+    text.extend(full.iter().map(|why| format!("disk full: {}\n", plain(why))));
+    text
 }
 
 /// How far those of these jobs are that are in work, as far as a daemon says so.
@@ -101,7 +113,10 @@ fn as_json(job: &Job, work: Option<&Work>) -> String {
 ///
 /// # Errors
 /// As [`reach::jobs`].
-pub(crate) fn all_as_json(dir: &Path) -> Result<String, Failure> {
+pub(crate) fn all_as_json(dir: &Path, store: Option<&Address>) -> Result<String, Failure> {
+    if let Some(address) = store {
+        return Ok(reach::shared_jobs(address, &JobsWish::List)?.iter().map(|job| as_json(job, None)).collect());
+    }
     let jobs = reach::jobs(dir, &JobsWish::List)?;
     let work = at_work(dir, &jobs);
     Ok(jobs.iter().map(|job| as_json(job, work_of(job, &work))).collect())

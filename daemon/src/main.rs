@@ -73,6 +73,7 @@ mod sentinel;
 mod settings;
 mod settle;
 mod shaped;
+mod shared;
 mod shown;
 mod signals;
 #[cfg(test)]

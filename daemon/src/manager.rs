@@ -10,8 +10,10 @@ use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use rustix::time::{ClockId, clock_gettime};
+use suture_store::patience::brief;
 
 use crate::attempt::Context;
+use crate::glance::away;
 
 const LOOK_EVERY: Duration = Duration::from_millis(100);
 /// How often it is said what is done.
@@ -57,6 +59,11 @@ impl Manager {
         }
     }
 
+    /// Says that the daemon waits, and why.
+    pub(crate) fn wait(&self, why: &str) {
+        self.say(&format!("STATUS={why}"));
+    }
+
     /// Tells of one life of the daemon, until `is_over`.
     pub(crate) fn tell(&self, context: &Context, is_over: &dyn Fn() -> bool) {
         if self.socket.is_none() {
@@ -89,8 +96,9 @@ impl Manager {
         if pulse.is_ending() && !std::mem::replace(&mut told.ending, true) {
             self.say("STOPPING=1");
         }
-        // While it ends, its jobs have a time limit of their own.
-        if pulse.is_ending() || self.watchdog.is_some_and(|watchdog| pulse.silence() < watchdog) {
+        // While it ends, its jobs have a time limit of their own; while its database is away, it can only wait.
+        if pulse.is_ending() || context.store.away().is_some() || self.watchdog.is_some_and(|watchdog| pulse.silence() < watchdog)
+        {
             self.beat(now);
         }
         if told.status.is_none_or(|then| now.duration_since(then) >= STATUS_EVERY) {
@@ -111,7 +119,11 @@ struct Told {
 
 /// What the daemon does, in one line.
 fn status(context: &Context) -> String {
-    let counts = context.store.counts().unwrap_or_default();
+    let counts = brief(|| context.store.counts());
+    if let Some(why) = away(context) {
+        return why;
+    }
+    let counts = counts.unwrap_or_default();
     let sum =
         |of: fn(suture_store::Kind) -> bool| counts.iter().filter(|(kind, _)| of(*kind)).map(|(_, count)| count).sum::<u64>();
     let held = context.schedule.standing().held;

@@ -29,6 +29,9 @@ pub(crate) fn parse<T: DeserializeOwned>(text: &str) -> Result<T, String> {
 pub(crate) fn with_line(text: &str, at: usize, what: &str) -> String {
     let before = text.get(..at).unwrap_or_default().matches('\n').count();
     let shown = text.lines().nth(before).unwrap_or_default().trim();
+    // An address may have a password in it.
+    let shown =
+        if shown.contains("://") && shown.contains('@') { shown.split('=').next().unwrap_or_default().trim() } else { shown };
     format!("line {}, `{shown}`: {what}", before + 1)
 }
 

@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use suture_store::{Job, SledStore, StoreError};
+use suture_store::{Address, Job, SledStore, StoreError};
 
 use crate::config::default_state;
 use crate::control::{DaemonWish, GlanceWish, JobsWish, Refusal, Wish, answer, ask};
@@ -19,6 +19,7 @@ use crate::folder::must_answer;
 use crate::fsx;
 use crate::glance::{Glance, Work};
 use crate::schedule::Standing;
+use crate::shared::{daemon_name, noted, visit};
 use crate::{standstill, watch, watchdog};
 
 /// How long a store that is held while no one answers is waited for.
@@ -67,6 +68,14 @@ pub(crate) fn jobs(dir: &Path, wish: &JobsWish) -> Result<Vec<Job>, Failure> {
     Ok(match daemon_or_store(dir, wish, wish)? {
         Answered::Daemon(jobs) | Answered::Store(jobs) => jobs,
     })
+}
+
+/// The same of the jobs of a shared store, whoever serves their folders.
+///
+/// # Errors
+/// When there is no such job or store, or its database does not answer.
+pub(crate) fn shared_jobs(address: &Address, wish: &JobsWish) -> Result<Vec<Job>, Failure> {
+    Ok(answer(&*visit(address, &daemon_name(Path::new(".")))?, wish)?)
 }
 
 /// Who answered: only the store's answer says that no daemon ran.
@@ -133,14 +142,17 @@ pub(crate) fn daemon(dir: &Path, wish: &DaemonWish) -> Result<Option<Standing>, 
 ///
 /// # Errors
 /// When `dir` is no hot folder, or neither a daemon answers nor the store can be read.
-pub(crate) fn glance(dir: &Path) -> Result<Glance, Failure> {
+pub(crate) fn glance(dir: &Path, store: Option<&Address>) -> Result<Glance, Failure> {
+    if let Some(address) = store {
+        return Ok(Glance::of_jobs(shared_jobs(address, &JobsWish::List)?, Vec::new(), None));
+    }
     let jobs = match daemon_or_store(dir, &GlanceWish, &JobsWish::List)? {
         Answered::Daemon(glance) => return Ok(glance),
         Answered::Store(jobs) => jobs,
     };
     let state = state_of(dir).map_err(|error| unseen(dir, &error))?;
     let paused = standstill::is_set(&state).map_err(|error| unseen(&state, &error))?;
-    Ok(Glance::of_jobs(jobs, paused.then(|| standstill::WORDS.into()).into_iter().collect(), &state))
+    Ok(Glance::of_jobs(jobs, paused.then(|| standstill::WORDS.into()).into_iter().collect(), Some(&state)))
 }
 
 /// The jobs that the daemon of a hot folder has in work; none, if none runs.
@@ -216,6 +228,9 @@ impl<E: Into<Failure>> From<E> for Unread {
 }
 
 fn through_store(state: &Path, wish: &JobsWish) -> Result<Vec<Job>, Unread> {
+    if let Some(address) = noted(state).map_err(|error| unseen(state, &error))? {
+        return Err(Unread::Failed(elsewhere(state, &address)));
+    }
     let held = |error| match error {
         StoreError::Locked { pid, .. } => Unread::Held(pid),
         error => Unread::from(error),
@@ -231,6 +246,15 @@ fn through_store(state: &Path, wish: &JobsWish) -> Result<Vec<Job>, Unread> {
             Ok(answer(&SledStore::open(state).map_err(held)?, wish)?)
         }
     }
+}
+
+/// The jobs are in a shared store, which no daemon asks for whoever wants to know.
+pub(crate) fn elsewhere(state: &Path, address: &str) -> Failure {
+    let line = format!(
+        "{}: the jobs are in {address}, and no daemon answers here; add --store {address} to look there",
+        state.display()
+    );
+    Failure { line, exit: Exit::Refused }
 }
 
 fn held(dir: &Path, pid: Option<u32>) -> Failure {
@@ -294,7 +318,7 @@ mod tests {
         let dir = hot();
         let _store = SledStore::open(&state_of(dir.path()).unwrap()).unwrap();
         let glance = std::thread::scope(|scope| {
-            let asking = scope.spawn(|| glance(dir.path()));
+            let asking = scope.spawn(|| glance(dir.path(), None));
             std::thread::sleep(Duration::from_millis(300));
             let listener = UnixListener::bind(dir.path().join(".suture/control.sock")).unwrap();
             let (stream, _) = listener.accept().unwrap();

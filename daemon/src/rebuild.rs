@@ -15,6 +15,7 @@ use crate::past::{Which, fill};
 use crate::publish_error::PublishError;
 use crate::reach::{Failure, must_be_hot, state_of, unseen, watched};
 use crate::rebuilt;
+use crate::shared::noted;
 
 /// What came of it.
 pub(crate) struct Rebuilt {
@@ -32,6 +33,11 @@ pub(crate) fn rebuild(dir: &Path) -> Result<Rebuilt, Failure> {
     must_be_hot(dir)?;
     watched()?;
     let state = state_of(dir).map_err(|error| unseen(dir, &error))?;
+    if let Some(address) = noted(&state).map_err(|error| unseen(&state, &error))? {
+        let line =
+            format!("{}: the jobs are in {address}; `suture store verify --store {address}` looks at them", state.display());
+        return Err(Failure { line, exit: Exit::Refused });
+    }
     // Held until all is done: no daemon begins meanwhile.
     let folder = served_as(dir, &state).and_then(|config| Folder::open(&config, None)).map_err(|error| Failure {
         exit: if let FolderError::Owned { .. } = error { Exit::Owned } else { Exit::TryAgain },

@@ -82,6 +82,7 @@ fn from_args(args: &WatchArgs) -> Result<Config, String> {
     config.workers = args.workers.map_or(config.workers, usize::from);
     config.threads = args.threads.map_or(config.threads, usize::from);
     config.settle = args.settle.or(config.settle);
+    config.store = args.store.clone().or(config.store);
     config.check_memory()?;
     if let Some(listen) = args.listen {
         let api = config.api.take().unwrap_or_else(|| Api::at(listen));
@@ -96,6 +97,9 @@ fn fixed(old: &Config, new: &Config) -> Vec<String> {
     let mut fixed = Vec::new();
     if real(&old.state) != real(&new.state) {
         fixed.push("`state`".to_owned());
+    }
+    if old.store != new.store {
+        fixed.push("`store`".to_owned());
     }
     if old.api != new.api {
         fixed.push("`[api]`".to_owned());

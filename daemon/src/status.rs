@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use suture_store::{Kind, Time};
+use suture_store::{Address, Kind, Time};
 
 use crate::cli::service::StatusArgs;
 use crate::exit::Exit;
@@ -16,7 +16,7 @@ pub(crate) mod top;
 
 /// Shows it once.
 pub(crate) fn run(args: &StatusArgs) -> Exit {
-    let glance = match reach::glance(&args.dir) {
+    let glance = match reach::glance(&args.dir, args.store.as_ref()) {
         Ok(glance) => glance,
         Err(failure) => {
             complain(&failure.line);
@@ -25,15 +25,18 @@ pub(crate) fn run(args: &StatusArgs) -> Exit {
     };
     let text = match args.json {
         true => serde_json::to_string(&glance).unwrap_or_default() + "\n",
-        false => screen(&args.dir, &glance),
+        false => screen(&args.dir, args.store.as_ref(), &glance),
     };
     print(text.as_bytes(), if args.ready && !glance.ready { Exit::NotGood } else { Exit::Good })
 }
 
 /// All of it, in lines.
-fn screen(dir: &Path, glance: &Glance) -> String {
+fn screen(dir: &Path, shared: Option<&Address>, glance: &Glance) -> String {
     let dir = plain(&dir.display().to_string());
     let mut text = match (&glance.since, &glance.reason) {
+        (None, _) if shared.is_some() => {
+            shared.map(|address| format!("{address}: this is what the shared job store says\n")).unwrap_or_default()
+        }
         (None, _) => format!("{dir}: no daemon runs; this is what its job store says\n"),
         (Some(since), reason) => {
             let how = reason.as_ref().map_or_else(|| "ready".into(), |why| format!("not ready: {}", plain(why)));
@@ -63,7 +66,9 @@ fn screen(dir: &Path, glance: &Glance) -> String {
         let path = plain(&folder.path.display().to_string());
         text += &format!("  folder    {}: {room}  {path}\n", plain(&folder.name));
     }
-    text += &format!("  job store {}\n", show_size(glance.store_bytes));
+    if shared.is_none() {
+        text += &format!("  job store {}\n", show_size(glance.store_bytes));
+    }
     let folders = Folders::of(glance.last.iter().chain(&glance.review));
     for (head, jobs) in [("ended last", &glance.last), ("to be looked at", &glance.review)] {
         if !jobs.is_empty() {
@@ -139,7 +144,7 @@ mod tests {
 
     #[test]
     fn all_of_it_is_on_one_screen() {
-        let text = screen(Path::new("hot"), &glance());
+        let text = screen(Path::new("hot"), None, &glance());
         for words in [
             "hot: suture 1 runs since 20",
             ", ready\n",

@@ -1,25 +1,35 @@
-//! `suture store`: is every record of a job store as it must be, and all of its jobs as lines of JSON.
+//! `suture store`: is every record of a job store as it must be, all of its jobs as lines of JSON, and how it moves ([`moved`]).
 
 use std::io::ErrorKind;
 use std::path::Path;
 
-use suture_store::{SledStore, StoreError, Verified};
+use suture_store::{Address, SledStore, StoreError, Verified};
 
 use crate::cli::service::{StoreArgs, StoreCommand};
 use crate::exit::Exit;
-use crate::reach::{Failure, must_be_hot, state_of, unseen, watched};
+use crate::reach::{Failure, elsewhere, must_be_hot, state_of, unseen, watched};
 use crate::say::{complain, plain, print};
+use crate::shared::{self, make, noted, visit};
 use crate::units::show_count;
 use crate::{create, fsx, jobs};
+
+mod moved;
+
+use moved::owned;
 
 /// Lines that are shown of what is wrong: who has more of them needs no more of them.
 const SHOWN: usize = 50;
 
 /// Does what the command line asks.
 pub(crate) fn run(args: &StoreArgs) -> Exit {
+    let (dir, address) = (args.dir.as_path(), args.store.as_ref());
     let done = match &args.command {
-        StoreCommand::Verify => verify(&args.dir),
-        StoreCommand::Export { output, force } => export(&args.dir, output.as_deref(), *force),
+        StoreCommand::Verify { against: Some(file) } => verify(dir, address).and_then(|exit| compared(dir, address, file, exit)),
+        StoreCommand::Verify { against: None } => verify(dir, address),
+        StoreCommand::Export { complete, output, force } => export(dir, address, *complete, output.as_deref(), *force),
+        StoreCommand::Import { file } => moved::import(dir, address, file),
+        StoreCommand::Create => create_shared(address),
+        StoreCommand::Role { name } => role(name),
     };
     done.unwrap_or_else(|Failure { line, exit }| {
         complain(&line);
@@ -27,10 +37,16 @@ pub(crate) fn run(args: &StoreArgs) -> Exit {
     })
 }
 
-fn verify(dir: &Path) -> Result<Exit, Failure> {
+fn verify(dir: &Path, address: Option<&Address>) -> Result<Exit, Failure> {
+    if let Some(address) = address {
+        return verify_shared(address);
+    }
     must_be_hot(dir)?;
     let state = state_of(dir).map_err(|error| unseen(dir, &error))?;
     let place = plain(&state.display().to_string());
+    if let Some(address) = noted(&state).map_err(|error| unseen(&state, &error))? {
+        return Err(elsewhere(&state, &address));
+    }
     if !fsx::is_folder(&state).map_err(|error| unseen(&state, &error))? {
         let none = format!("{place}: there is no job store yet; the next `suture watch` makes one\n");
         return Ok(print(none.as_bytes(), Exit::Good));
@@ -44,13 +60,47 @@ fn verify(dir: &Path) -> Result<Exit, Failure> {
     Ok(print(said(&place, &found).as_bytes(), exit))
 }
 
-fn owned(dir: &Path, pid: Option<u32>) -> Failure {
-    let who = pid.map(|pid| format!(" (process {pid})")).unwrap_or_default();
-    let line = format!(
-        "{}: a daemon{who} has the job store, and may change it at any time: stop it, then verify; `suture store export` works meanwhile",
-        dir.display()
+/// The same of a shared store, which others may work with meanwhile.
+fn verify_shared(address: &Address) -> Result<Exit, Failure> {
+    let store = visit(address, "")?;
+    let jobs = store.counts()?.iter().map(|(_, count)| count).sum();
+    let advice = "keep a copy of the database, and restore the last one that was sound".into();
+    let found = Verified { jobs, records: jobs, wrong: store.verify()?, advice, ..Verified::default() };
+    let exit = if found.wrong.is_empty() { Exit::Good } else { Exit::NotGood };
+    Ok(print(said(&address.to_string(), &found).as_bytes(), exit))
+}
+
+/// What the store holds otherwise than an export says.
+fn compared(dir: &Path, address: Option<&Address>, file: &Path, exit: Exit) -> Result<Exit, Failure> {
+    let lines = moved::differences(dir, address, file)?;
+    let mut text = match lines.len() {
+        0 => format!("{}: the store holds the same\n", plain(&file.display().to_string())),
+        count => format!(
+            "{}: the store holds something else in {} places\n",
+            plain(&file.display().to_string()),
+            show_count(count as u64)
+        ),
+    };
+    text.extend(lines.iter().take(SHOWN).map(|line| format!("  {}\n", plain(line))));
+    Ok(print(text.as_bytes(), if lines.is_empty() { exit } else { Exit::NotGood }))
+}
+
+fn create_shared(address: Option<&Address>) -> Result<Exit, Failure> {
+    let Some(address) = address else {
+        let line = "name the database with --store; a folder's store is made by its daemon".to_owned();
+        return Err(Failure { line, exit: Exit::Refused });
+    };
+    make(address)?;
+    Ok(print(format!("{address}: the job store is there, and up to date\n").as_bytes(), Exit::Good))
+}
+
+fn role(name: &str) -> Result<Exit, Failure> {
+    let quoted = format!("\"{}\"", name.replace('"', "\"\""));
+    let head = format!(
+        "-- To be run by the owner of the database, after `suture store create --store postgres://OWNER@HOST/DATABASE` has made the schema.\n\
+         -- A password: \\password {name} in psql, or a line of pg_hba.conf that needs none.\nCREATE ROLE {quoted} LOGIN;\n"
     );
-    Failure { line, exit: Exit::Owned }
+    Ok(print((head + &shared::role(name)?).as_bytes(), Exit::Good))
 }
 
 /// The findings, for people.
@@ -72,10 +122,10 @@ fn said(place: &str, found: &Verified) -> String {
     text
 }
 
-fn export(dir: &Path, output: Option<&Path>, force: bool) -> Result<Exit, Failure> {
-    let text = jobs::all_as_json(dir)?;
-    let Some(path) = output else { return Ok(print(text.as_bytes(), Exit::Good)) };
-    create::place(path, text.as_bytes(), force).map(|()| Exit::Good).map_err(|error| {
+fn export(dir: &Path, address: Option<&Address>, complete: bool, output: Option<&Path>, force: bool) -> Result<Exit, Failure> {
+    let text = if complete { moved::export(dir, address)? } else { jobs::all_as_json(dir, address)?.into_bytes() };
+    let Some(path) = output else { return Ok(print(&text, Exit::Good)) };
+    create::place(path, &text, force).map(|()| Exit::Good).map_err(|error| {
         let advice = if error.kind() == ErrorKind::AlreadyExists { " (--force replaces it)" } else { "" };
         Failure { line: format!("{}: cannot be written: {error}{advice}", path.display()), exit: Exit::Refused }
     })

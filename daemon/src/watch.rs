@@ -10,7 +10,8 @@ use std::time::{Duration, Instant};
 
 use crossbeam::channel::unbounded;
 use suture_store::job::{Kind, Testimony};
-use suture_store::{JobStore, Opening, Query, SledStore, StoreError, crash_point};
+use suture_store::patience::hurry_when;
+use suture_store::{Opening, Query, StoreError, crash_point};
 
 use crate::again::Lives;
 use crate::attempt::{Context, IN_HAND, Slot, WITNESS, remove_work};
@@ -34,7 +35,9 @@ use crate::retention::turns::Moment;
 use crate::say::complain;
 use crate::schedule::{Hold, Schedule, Turn};
 use crate::settings::Settings;
+use crate::shared::{self, Opened};
 use crate::signals::{Hangup, Stop};
+use crate::units::show_when;
 use crate::web::Web;
 use crate::window::RunWindow;
 use crate::world::{Machine, World};
@@ -100,9 +103,11 @@ pub(crate) fn serve(settings: Settings, once: bool, stop: &Stop, may_begin_anew:
         return Exit::TryAgain;
     }
     let asked = Instant::now();
-    let store = loop {
-        match SledStore::open(&config.state) {
-            Ok(store) => break Arc::new(store),
+    let hurried = stop.clone();
+    hurry_when(move || hurried.asked());
+    let opened = loop {
+        match shared::open(&config) {
+            Ok(opened) => break opened,
             Err(StoreError::Locked { pid, .. }) if is_fading(pid, asked) => std::thread::sleep(Duration::from_millis(10)),
             Err(error) => return store_failed(&error),
         }
@@ -112,7 +117,7 @@ pub(crate) fn serve(settings: Settings, once: bool, stop: &Stop, may_begin_anew:
     note_folders(&config, &folders);
     let settings = Arc::new(settings);
     let manager = Manager::of_environment();
-    let daemon = Daemon { settings, folders, store, web, manager, once, lives, not_good, stop: stop.clone(), may_begin_anew };
+    let daemon = Daemon { settings, folders, opened, web, manager, once, lives, not_good, stop: stop.clone(), may_begin_anew };
     daemon.run()
 }
 
@@ -189,7 +194,7 @@ fn store_failed(error: &StoreError) -> Exit {
 struct Daemon {
     settings: Arc<Settings>,
     folders: Vec<Arc<Folder>>,
-    store: Arc<SledStore>,
+    opened: Opened,
     web: Option<Web>,
     manager: Manager,
     once: bool,
@@ -226,17 +231,20 @@ impl Daemon {
         }
     }
 
-    /// Waits until there is room for the store, and the mount that its folder lies on: a new life could do nothing on a full disk, and would
+    /// Waits until its database answers, and there is room for the store, and the mount that its folder lies on: a new life could do nothing on a full disk, and would
     /// take the bare folder under a mount for an empty one.
     fn wait_for_store(&self) {
         let state = real(&self.settings.now().state);
         let folder = self.folders.iter().find(|folder| state.starts_with(real(&folder.root)));
+        let store = &self.opened.store;
+        let away = || store.away().map(|since| format!("the job database has not answered since {}", show_when(since.0)));
         let full = || (fsx::free_space(&state, 0) < ROOM).then(|| format!("the disk of {} is full", state.display()));
-        let why = || folder.and_then(|folder| folder.missing()).or_else(full);
+        let why = || folder.and_then(|folder| folder.missing()).or_else(away).or_else(full);
         let mut told = false;
         while let Some(reason) = why().filter(|_| !self.once && !self.stop.asked()) {
             if !std::mem::replace(&mut told, true) {
                 tracing::error!(reason, "The job store waits; nothing is done until it can be opened again.");
+                self.manager.wait(&reason);
             }
             self.manager.beat(Instant::now());
             std::thread::sleep(LOOK_EVERY);
@@ -245,19 +253,18 @@ impl Daemon {
 
     fn live(&self) -> End {
         let (events, inbox) = unbounded();
-        let unread = match Unread::of(&*self.store, &self.folders) {
+        let unread = match Unread::of(&*self.opened.store, &self.folders) {
             Ok(unread) => unread,
             Err(error) => return End::Store(error),
         };
         let bus = Arc::new(Bus::new(self.web.is_some()));
-        tell_opening(&bus, self.store.opening());
+        tell_opening(&bus, &self.opened.opening);
         rebuilt::tell(&self.settings.now().state, &bus);
-        let store = Arc::clone(&self.store) as Arc<dyn JobStore>;
         let world: Arc<dyn World> = Arc::new(Machine);
         let context = Arc::new(Context {
             schedule: Schedule::new(Arc::clone(&world)),
             world,
-            store: Arc::new(Heard::new(store, Arc::clone(&bus))),
+            store: Arc::new(Heard::new(Arc::clone(&self.opened.store), Arc::clone(&bus))),
             folders: self.folders.clone(),
             settings: Arc::clone(&self.settings),
             events,

@@ -11,12 +11,14 @@
 #![deny(missing_docs)]
 #![cfg_attr(test, allow(clippy::disallowed_methods, reason = "tests may ask whether a file is there"))]
 
+mod address;
 pub mod crash;
 pub mod id;
 pub mod job;
 mod memory;
 mod news;
 pub mod path;
+pub mod patience;
 #[cfg(feature = "postgres")]
 mod postgres;
 mod queue;
@@ -29,6 +31,7 @@ mod tables;
 pub mod testkit;
 pub mod transfer;
 
+pub use address::Address;
 pub use crash::crash_point;
 pub use id::{Attempt, Boot, Clock, Epoch, Hash, JobId, Recipe, Seq, SystemClock, Time, Token};
 pub use job::{Decision, Ending, Job, Kind, Past, Priority, Publication, Reached, Source, State, Step, Verdict};
@@ -37,7 +40,7 @@ pub use news::{News, Notice, Word};
 pub use path::RelPath;
 #[cfg(feature = "postgres")]
 pub use postgres::{PostgresStore, Shared, role};
-pub use sled_store::{Opening, SledStore, Verified};
+pub use sled_store::{Opening, SledStore, StateLock, Verified};
 pub use store::{
     Claim, Control, Filter, JobStore, Lease, Look, Page, Query, Recovered, StoreError, Submission, Submitted, Waiting,
 };

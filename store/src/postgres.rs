@@ -27,9 +27,10 @@ use tokio::runtime::Runtime;
 
 #[cfg(any(test, feature = "testkit"))]
 use crate::id::Clock;
-use crate::id::{JobId, Recipe, Seq, Time};
+use crate::id::{Epoch, JobId, Recipe, Seq, Time};
 use crate::job::{Event, Illegal, Job, Kind, Past, Source, Step, Testimony, one_line};
 use crate::news::{News, Notice};
+use crate::patience::{brief, is_brief};
 use crate::queue::fits;
 use crate::queue::notices::can_be_subscribers;
 use crate::queue::past::can_be_recorded;
@@ -37,7 +38,7 @@ use crate::queue::submit::{CHUNK, can_be_taken};
 use crate::store::{
     Claim, Control, Filter, JobStore, Lease, Look, Page, Query, Recovered, StoreError, Submission, Submitted, Waiting,
 };
-use crate::transfer::{Holdings, Transfer};
+use crate::transfer::{Holdings, SharedStore, Transfer};
 
 mod claim;
 mod database;
@@ -45,8 +46,10 @@ mod leases;
 mod look;
 mod marks;
 mod migrate;
+mod news;
 mod notices;
 mod open;
+mod outage;
 mod outbox;
 mod recover;
 mod row;
@@ -59,6 +62,7 @@ mod transfer;
 use claim::Life;
 use database::{Again, Database, Failure, wait};
 use leases::Claims;
+use open::As;
 pub use open::{Shared, role};
 use step::By;
 
@@ -71,6 +75,8 @@ pub struct PostgresStore {
     life: Life,
     claims: Arc<Claims>,
     shut: Mutex<Vec<String>>,
+    /// Of the words that wake idle daemons.
+    channel: String,
     /// Names claims among all of this life.
     calls: AtomicI64,
     /// When leases of others were looked at last. Only how often depends on it.
@@ -85,7 +91,16 @@ impl PostgresStore {
     /// [`StoreError::Newer`] and [`StoreError::Unusable`] when the schema is another program's, or the database does not keep what it acknowledges;
     /// [`StoreError::Backend`] when it cannot be reached.
     pub fn open(shared: &Shared) -> Result<Self, StoreError> {
-        open::begin(shared, None).map(Self::over)
+        open::begin(shared, As::Daemon, None).map(Self::over)
+    }
+
+    /// Opens a store that is there, to look at it, or to say what is to become of jobs: no life of a daemon begins or ends, and nothing can be
+    /// claimed. `shared.daemon` says whose marks and claims it takes over ([`Transfer::take_over`]).
+    ///
+    /// # Errors
+    /// As [`PostgresStore::open`]; [`StoreError::Unusable`] as well when there is no store.
+    pub fn visit(shared: &Shared) -> Result<Self, StoreError> {
+        open::begin(shared, As::Visitor, None).map(Self::over)
     }
 
     /// The same under a clock that the caller sets, for tests: no machine's clock is asked.
@@ -94,20 +109,26 @@ impl PostgresStore {
     /// As [`PostgresStore::open`].
     #[cfg(any(test, feature = "testkit"))]
     pub fn open_at(shared: &Shared, clock: Arc<dyn Clock>) -> Result<Self, StoreError> {
-        open::begin(shared, Some(clock)).map(Self::over)
+        open::begin(shared, As::Daemon, Some(clock)).map(Self::over)
     }
 
-    fn over(open::Begun { runtime, end, database, life, claims }: open::Begun) -> Self {
+    fn over(open::Begun { runtime, end, database, life, claims, channel }: open::Begun) -> Self {
         let (shut, calls, looked) = (Mutex::default(), AtomicI64::new(1), Mutex::default());
-        Self { runtime: Some(runtime), end, database, life, claims, shut, calls, looked }
+        Self { runtime: Some(runtime), end, database, life, claims, shut, channel, calls, looked }
     }
 
-    /// Looks at every row; a line for each that is damaged, or says something else than its record. Other daemons may go on meanwhile.
+    /// Makes the store, or brings it up to date, and begins nothing: for the owner of its schema.
     ///
     /// # Errors
-    /// Where the database cannot be read, or holds a record of a newer version. A damaged record is a finding, not an error.
-    pub fn verify(&self) -> Result<Vec<String>, StoreError> {
-        self.ask(async |connection| transfer::verify(connection).await)
+    /// As [`PostgresStore::open`].
+    pub fn make(shared: &Shared) -> Result<(), StoreError> {
+        open::begin(shared, As::Owner, None).map(Self::over).map(drop)
+    }
+
+    /// Ends as a kill would: its life is not noted as over.
+    #[cfg(test)]
+    fn end_without_a_word(mut self) {
+        self.life.epoch = Epoch(0);
     }
 
     fn call<T: Send>(
@@ -116,11 +137,16 @@ impl PostgresStore {
         call: impl AsyncFn(&mut PgConnection) -> Result<T, Failure> + Sync,
     ) -> Result<T, StoreError> {
         let Some(runtime) = &self.runtime else { return Err(StoreError::Poisoned { reason: "the store was closed".into() }) };
-        wait(runtime, async || self.database.call(again, &call).await)
+        let is_brief = is_brief();
+        wait(runtime, async || self.database.call(again, is_brief, &call).await)
     }
 
     fn ask<T: Send>(&self, call: impl AsyncFn(&mut PgConnection) -> Result<T, Failure> + Sync) -> Result<T, StoreError> {
         self.call(Again::Yes, call)
+    }
+
+    fn served(&self) -> Option<&[String]> {
+        self.life.folders.as_deref()
     }
 
     fn folders_shut(&self) -> Vec<String> {
@@ -170,6 +196,11 @@ impl PostgresStore {
 
 impl Drop for PostgresStore {
     fn drop(&mut self) {
+        if self.life.epoch != Epoch(0) {
+            let ended = brief(|| self.ask(async |connection| leases::end(connection, &self.life).await));
+            // Then others take it for dead after a lease.
+            ended.unwrap_or_else(|error| tracing::debug!(%error, "The end of this daemon's life could not be noted."));
+        }
         let unheard = self.runtime.take().and_then(|runtime| self.end.send(runtime).err());
         if let Some(runtime) = unheard.and_then(|unheard| Arc::into_inner(unheard.0)) {
             runtime.shutdown_background();
@@ -184,6 +215,12 @@ impl Transfer for PostgresStore {
 
     fn take_over(&self, holdings: &Holdings) -> Result<(), StoreError> {
         self.call(Again::No, async |connection| transfer::take_over(connection, &self.life, holdings).await)
+    }
+}
+
+impl SharedStore for PostgresStore {
+    fn verify(&self) -> Result<Vec<String>, StoreError> {
+        self.ask(async |connection| transfer::verify(connection).await)
     }
 }
 
@@ -205,12 +242,12 @@ impl JobStore for PostgresStore {
 
     fn has_parked(&self) -> Result<bool, StoreError> {
         let shut = self.folders_shut();
-        self.ask(async |connection| claim::has_parked(connection, &shut).await)
+        self.ask(async |connection| claim::has_parked(connection, &self.life, &shut).await)
     }
 
     fn waiting(&self, want: &Filter) -> Result<Option<Waiting>, StoreError> {
         let shut = self.folders_shut();
-        self.ask(async |connection| claim::waiting(connection, want, &shut).await)
+        self.ask(async |connection| claim::waiting(connection, &self.life, want, &shut).await)
     }
 
     fn shut(&self, folders: &BTreeSet<String>) {
@@ -265,11 +302,11 @@ impl JobStore for PostgresStore {
     }
 
     fn list(&self, query: &Query) -> Result<Vec<Job>, StoreError> {
-        self.ask(async |connection| look::list(connection, query).await)
+        self.ask(async |connection| look::list(connection, self.served(), query).await)
     }
 
     fn page(&self, look: &Look) -> Result<Page, StoreError> {
-        self.ask(async |connection| look::page(connection, look).await)
+        self.ask(async |connection| look::page(connection, self.served(), look).await)
     }
 
     fn find(&self, source: &Source) -> Result<Option<JobId>, StoreError> {
@@ -277,7 +314,7 @@ impl JobStore for PostgresStore {
     }
 
     fn results(&self, size: u64, recipe: Option<Recipe>) -> Result<Vec<Job>, StoreError> {
-        self.ask(async |connection| look::results(connection, size, recipe).await)
+        self.ask(async |connection| look::results(connection, self.served(), size, recipe).await)
     }
 
     fn check(&self) -> Result<(), StoreError> {
@@ -290,7 +327,7 @@ impl JobStore for PostgresStore {
     }
 
     fn is_unfilled(&self) -> Result<bool, StoreError> {
-        self.ask(async |connection| marks::is_unfilled(connection).await)
+        self.ask(async |connection| marks::is_unfilled(connection, &self.life).await)
     }
 
     fn restore(&self, past: &[Past]) -> Result<Vec<JobId>, StoreError> {
@@ -303,24 +340,24 @@ impl JobStore for PostgresStore {
     }
 
     fn set_filled(&self) -> Result<(), StoreError> {
-        self.ask(async |connection| marks::set_filled(connection).await)
+        self.ask(async |connection| marks::set_filled(connection, &self.life).await)
     }
 
     fn subscribe(&self, names: &[String]) -> Result<(), StoreError> {
         can_be_subscribers(names)?;
-        self.ask(async |connection| notices::subscribe(connection, names).await)
+        self.ask(async |connection| notices::subscribe(connection, &self.life, names).await)
     }
 
     fn notices(&self, name: &str, most: usize) -> Result<Vec<Notice>, StoreError> {
-        self.ask(async |connection| notices::notices(connection, name, most).await)
+        self.ask(async |connection| notices::notices(connection, &self.life, name, most).await)
     }
 
     fn acknowledge(&self, name: &str, seq: Seq) -> Result<(), StoreError> {
-        self.ask(async |connection| notices::acknowledge(connection, name, seq).await)
+        self.ask(async |connection| notices::acknowledge(connection, &self.life, name, seq).await)
     }
 
     fn backlog(&self, name: &str) -> Result<u64, StoreError> {
-        self.ask(async |connection| notices::backlog(connection, name).await)
+        self.ask(async |connection| notices::backlog(connection, &self.life, name).await)
     }
 
     fn tell(&self, news: &News) -> Result<bool, StoreError> {
@@ -329,18 +366,28 @@ impl JobStore for PostgresStore {
             fits("the folder's name", folder)?;
             *reason = one_line(reason);
         }
-        self.ask(async |connection| marks::tell(connection, &news).await)
+        self.ask(async |connection| marks::tell(connection, &self.life, &news).await)
     }
 
     fn last_night(&self) -> Result<Option<Time>, StoreError> {
-        self.ask(async |connection| marks::last_night(connection).await)
+        self.ask(async |connection| marks::last_night(connection, &self.life).await)
     }
 
     fn begin_night(&self, at: Time) -> Result<(), StoreError> {
-        self.ask(async |connection| marks::begin_night(connection, at).await)
+        self.ask(async |connection| marks::begin_night(connection, &self.life, at).await)
     }
 
     fn counts(&self) -> Result<Vec<(Kind, u64)>, StoreError> {
-        self.ask(async |connection| look::counts(connection).await)
+        self.ask(async |connection| look::counts(connection, self.served()).await)
+    }
+
+    fn away(&self) -> Option<Time> {
+        self.database.outage.since()
+    }
+
+    fn hear(&self, news: Arc<dyn Fn() + Send + Sync>) {
+        if let Some(runtime) = &self.runtime {
+            runtime.spawn(news::listen(self.database.options(), self.channel.clone(), news));
+        }
     }
 }

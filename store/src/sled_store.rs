@@ -61,13 +61,24 @@ pub struct SledStore {
     queue: Queue<SledTables>,
     opening: Opening,
     /// The folder is ours until every handle of the database is gone: dropped last.
-    lock: Lock,
+    lock: StateLock,
 }
 
-/// The lock of the state folder.
-struct Lock(File);
+/// The lock of a state folder, which one daemon has at a time; it ends with the process, however that ends.
+pub struct StateLock(File);
 
-impl Drop for Lock {
+impl StateLock {
+    /// Takes the lock of the folder `state`, which is made if it is missing.
+    ///
+    /// # Errors
+    /// [`StoreError::Locked`] when another daemon has it; [`StoreError::Io`].
+    pub fn take(state: &Path) -> Result<Self, StoreError> {
+        files::make_folder(state)?;
+        files::lock(state).map(Self)
+    }
+}
+
+impl Drop for StateLock {
     fn drop(&mut self) {
         // Closing the file would do, but for a child that was started just now and has not let go of it yet.
         if let Err(error) = self.0.unlock() {
@@ -92,8 +103,7 @@ impl SledStore {
     /// # Errors
     /// As [`SledStore::open`].
     pub fn open_with(state: &Path, clock: Arc<dyn Clock>) -> Result<Self, StoreError> {
-        files::make_folder(state)?;
-        let lock = Lock(files::lock(state)?);
+        let lock = StateLock::take(state)?;
         let (queue, opening) = open::queue(state, &clock)?;
         Ok(Self { state: state.to_owned(), queue, opening, lock })
     }
@@ -122,7 +132,7 @@ impl SledStore {
     /// # Errors
     /// [`StoreError::Locked`] while a daemon owns the folder; else whatever keeps it from being looked at, or moved.
     pub fn set_aside(state: &Path) -> Result<Option<PathBuf>, StoreError> {
-        let _lock = Lock(files::lock(state)?);
+        let _lock = StateLock(files::lock(state)?);
         open::set_untrusted_aside(state, &(Arc::new(SystemClock) as Arc<dyn Clock>))
     }
 

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeSet;
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use crate::id::{Epoch, JobId, Recipe, Seq, Time, Token};
 use crate::job::{Decision, Event, Illegal, Job, Kind, Past, Priority, Source, Step, Testimony};
@@ -13,7 +14,7 @@ pub const MOST_RESULTS: usize = 8;
 pub const MOST_SUBSCRIBERS: usize = 32;
 
 /// A durable job queue. A returned `Ok` means that the change survives a crash of process or machine; an `Err` that it did not
-/// happen or, for [`StoreError::Backend`], [`StoreError::Io`] and [`StoreError::Poisoned`] only, that this is unknown until the
+/// happen or, for [`StoreError::Backend`], [`StoreError::Away`], [`StoreError::Io`] and [`StoreError::Poisoned`] only, that this is unknown until the
 /// store is opened again. Calls may come from any thread; calls at the same time share the cost of becoming durable.
 pub trait JobStore: Send + Sync {
     /// Takes found files in, all of them in one durable step where possible. Idempotent: a file that a job answers for already
@@ -189,6 +190,17 @@ pub trait JobStore: Send + Sync {
     /// # Errors
     /// Store errors only.
     fn counts(&self) -> Result<Vec<(Kind, u64)>, StoreError>;
+
+    /// Since when calls wait for a database that does not answer; `None`: it answers, as far as anyone knows. Waits for nothing.
+    fn away(&self) -> Option<Time> {
+        None
+    }
+
+    /// Has `news` be called whenever others may have brought something to claim, from a thread of the store's, until its end. Where no one else can, it
+    /// never is. Someone has to look now and then all the same.
+    fn hear(&self, news: Arc<dyn Fn() + Send + Sync>) {
+        drop(news);
+    }
 }
 
 /// A file that was found.
@@ -339,6 +351,17 @@ pub struct Page {
 #[derive(Debug, thiserror::Error)]
 #[allow(missing_docs, reason = "each variant says what its fields are")]
 pub enum StoreError {
+    /// The database that daemons share does not answer.
+    #[error("the job database does not answer, for {seconds} s now: {reason}; see that {place} runs, and is reached from here")]
+    Away { place: String, seconds: u64, reason: String },
+
+    /// Another daemon serves a hot folder of that name, on the same shared store.
+    #[error(
+        "the folder `{folder}` is served by another daemon already, {by}, with the same job database: give this one another name in a \
+         configuration, or stop that daemon"
+    )]
+    Served { folder: String, by: String },
+
     /// Another daemon owns the state folder.
     #[error("{} is owned by another daemon{}", path.display(), pid.map(|pid| format!(" (process {pid})")).unwrap_or_default())]
     Locked { path: PathBuf, pid: Option<u32> },
@@ -388,11 +411,11 @@ pub enum StoreError {
 }
 
 impl StoreError {
-    /// The process's exit code for it: 73 when another daemon owns the state folder, 75 when the store cannot be used (trying
+    /// The process's exit code for it: 73 when another daemon owns the state folder or a hot folder, 75 when the store cannot be used (trying
     /// again may help), 2 for what only this call got wrong.
     pub fn exit_code(&self) -> u8 {
         match self {
-            Self::Locked { .. } => 73,
+            Self::Locked { .. } | Self::Served { .. } => 73,
             Self::Unknown(_) | Self::Illegal { .. } | Self::TooLong { .. } => 2,
             _ => 75,
         }

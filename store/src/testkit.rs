@@ -12,6 +12,7 @@ mod notices;
 mod pages;
 mod past;
 mod results;
+pub mod server;
 mod tools;
 
 #[cfg(feature = "testkit")]

@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 use crate::id::{Epoch, JobId, Seq, Time};
 use crate::job::{Job, State};
 use crate::news::{Notice, Word};
-use crate::store::StoreError;
+use crate::store::{JobStore, StoreError};
 
 /// Of the lines.
 const VERSION: u32 = 1;
@@ -58,6 +58,15 @@ pub trait Transfer {
     /// # Errors
     /// [`StoreError::Unusable`] when it holds jobs already: nothing is taken over then.
     fn take_over(&self, holdings: &Holdings) -> Result<(), StoreError>;
+}
+
+/// A store that many may have open at a time, as whoever only looks at it sees it.
+pub trait SharedStore: JobStore + Transfer {
+    /// Looks at every row; a line for each that is damaged, or says something else than its record. Others may go on meanwhile.
+    ///
+    /// # Errors
+    /// Where the database cannot be read, or holds a record of a newer version. A damaged record is a finding, not an error.
+    fn verify(&self) -> Result<Vec<String>, StoreError>;
 }
 
 /// What goes wrong with a transfer.

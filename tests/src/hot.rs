@@ -10,6 +10,8 @@ use suture_bench::generate::{Case, write};
 pub struct Hot {
     dir: tempfile::TempDir,
     binary: PathBuf,
+    /// The address of a shared store that holds its jobs.
+    store: Option<String>,
 }
 
 /// All files below a folder: relative name to content.
@@ -23,7 +25,20 @@ impl Hot {
     pub fn new(binary: &Path) -> Self {
         let dir = tempfile::tempdir().expect("a temporary folder");
         std::fs::create_dir(dir.path().join("in")).expect("a folder for drops");
-        Self { dir, binary: binary.into() }
+        Self { dir, binary: binary.into(), store: None }
+    }
+
+    /// The same, its jobs in a shared store.
+    ///
+    /// # Panics
+    /// As [`Hot::new`].
+    pub fn sharing(binary: &Path, store: &str) -> Self {
+        Self { store: Some(store.into()), ..Self::new(binary) }
+    }
+
+    /// Says where the jobs are.
+    fn of_store(&self) -> impl Iterator<Item = &str> {
+        self.store.iter().flat_map(|store| ["--store", store])
     }
 
     /// Where it is.
@@ -44,7 +59,7 @@ impl Hot {
     /// The daemon over it, not yet started. It takes files after a short rest, and says nothing.
     pub fn watch(&self, options: &[&str]) -> Command {
         let mut command = Command::new(&self.binary);
-        command.arg("watch").arg(self.path()).args(["--settle", "30ms"]).args(options);
+        command.arg("watch").arg(self.path()).args(["--settle", "30ms"]).args(self.of_store()).args(options);
         command.env("SUTURE_LOG", "off").stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
         command
     }
@@ -99,10 +114,15 @@ impl Hot {
         let output = Command::new(&self.binary)
             .args(["jobs", "list", "--json", "--dir"])
             .arg(self.path())
+            .args(self.of_store())
             .output()
             .expect("the binary can be started");
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-        String::from_utf8_lossy(&output.stdout).lines().map(|line| serde_json::from_str(line).expect("a line of JSON")).collect()
+        let text = String::from_utf8_lossy(&output.stdout).into_owned();
+        let jobs = text.lines().map(|line| serde_json::from_str::<serde_json::Value>(line).expect("a line of JSON"));
+        // A shared store tells of all folders.
+        let name = self.path().file_name().and_then(|name| name.to_str());
+        jobs.filter(|job| self.store.is_none() || job["source"]["folder"].as_str() == name).collect()
     }
 
     /// `suture jobs` with these words; whether it was done.

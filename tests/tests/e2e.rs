@@ -10,6 +10,7 @@ mod e2e {
     mod companions;
     mod config;
     mod curves;
+    mod farm;
     mod features;
     mod files;
     mod fill_curves;

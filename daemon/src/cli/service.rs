@@ -5,6 +5,8 @@ use std::time::Duration;
 
 use clap::{Args, Subcommand};
 
+use suture_store::Address;
+
 use crate::units::parse_duration;
 
 #[derive(Args, Debug)]
@@ -12,6 +14,9 @@ pub(crate) struct StatusArgs {
     /// The hot folder
     #[arg(long, value_name = "DIR", default_value = ".")]
     pub dir: PathBuf,
+    /// What this shared store says, of whatever folder and machine, without asking a daemon
+    #[arg(long, value_name = "URL", value_parser = Address::parse)]
+    pub store: Option<Address>,
     /// Print JSON
     #[arg(long)]
     pub json: bool,
@@ -69,22 +74,44 @@ pub(crate) struct StoreArgs {
     /// The hot folder
     #[arg(long, value_name = "DIR", default_value = ".", global = true)]
     pub dir: PathBuf,
+    /// The store that daemons on many machines share, e.g. postgres://farm@db/suture, instead of the one of DIR
+    #[arg(long, value_name = "URL", value_parser = Address::parse, global = true)]
+    pub store: Option<Address>,
     #[command(subcommand)]
     pub command: StoreCommand,
 }
 
 #[derive(Debug, Subcommand)]
 pub(crate) enum StoreCommand {
-    /// Look at every record: say what is wrong and what to do, end with 1 if anything is, and change nothing; no daemon may run
-    Verify,
+    /// Look at every record: say what is wrong and what to do, end with 1 if anything is, and change nothing; no daemon may have the store of DIR
+    Verify {
+        /// Say as well what the store holds otherwise than this file says, which `export --complete` wrote
+        #[arg(long, value_name = "FILE")]
+        against: Option<PathBuf>,
+    },
     /// Write all jobs as JSON, one a line, as `jobs list --json` prints them; with or without a running daemon
     Export {
+        /// Write all that the store holds, for `import`; no daemon may have the store of DIR, and none should work on a shared one
+        #[arg(long)]
+        complete: bool,
         /// The file to write, whole or not at all [default: standard output]
         #[arg(short, long, value_name = "OUT")]
         output: Option<PathBuf>,
         /// Replace OUT if it exists
         #[arg(long, requires = "output")]
         force: bool,
+    },
+    /// Take over what `export --complete` wrote, into an empty store: of the database with --store, else of DIR, whose daemon may not run
+    Import {
+        #[arg(value_name = "FILE")]
+        file: PathBuf,
+    },
+    /// Make the store in the database of --store, or bring it up to date, as the user who owns it; a daemon whose user may do that needs no such step
+    Create,
+    /// Print the SQL that makes a role with no more rights than a daemon needs, for the owner of the database
+    Role {
+        #[arg(value_name = "NAME")]
+        name: String,
     },
 }
 

@@ -13,6 +13,7 @@ use toml::Spanned;
 use super::api::Api;
 use super::events::{self, OnDoneFile, WebhookFile};
 use super::keep::{Bound, Keep};
+use super::shared::StoreFile;
 use super::taken::OnTaken;
 use super::{Config, DEFAULT_PROFILE, FolderConfig, name_of, real};
 use crate::own_profile::OwnProfile;
@@ -31,6 +32,7 @@ struct File {
     #[serde(default)]
     folders: Vec<FolderFile>,
     state: Option<PathBuf>,
+    store: Option<StoreFile>,
     workers: Option<Count>,
     threads: Option<Count>,
     memory: Option<Size>,
@@ -223,6 +225,7 @@ fn from_text(text: &str) -> Result<Config, String> {
     config.profiles = own_profiles(text, file.profiles)?;
     config.folders = folders(text, &file.folders, &config)?;
     config.state = file.state.unwrap_or(config.state);
+    config.store = file.store.map(|store| store.0);
     config.workers = file.workers.map_or(config.workers, |count| count.0);
     config.threads = file.threads.map_or(config.threads, |count| count.0);
     config.memory = file.memory.map_or(config.memory, |size| size.0);

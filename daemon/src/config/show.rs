@@ -99,6 +99,8 @@ pub(crate) fn text(config: &Config) -> Result<String, String> {
         text += &format!("{name} = {value}\n");
     }
     text += &format!("state = {}\n", path(&config.state));
+    // Without the password: such a text is shown to people.
+    text += &config.store.as_ref().map(|store| format!("store = {}\n", quoted(&store.to_string()))).unwrap_or_default();
     for FolderConfig { name, path: root, profile, leave_originals, priority, on_taken } in &config.folders {
         text += &format!("\n[[folders]]\npath = {}\nname = {}\nprofile = {}\n", path(root), quoted(name), quoted(profile));
         text += &format!("leave_originals = {leave_originals}\npriority = {priority}\n");
@@ -145,7 +147,7 @@ fn own_profiles(profiles: &BTreeMap<String, OwnProfile>) -> Result<String, Strin
 #[cfg(test)]
 mod tests {
     use suture_core::Profile;
-    use suture_store::Priority;
+    use suture_store::{Address, Priority};
 
     use super::*;
     use crate::config::events::When;
@@ -172,9 +174,18 @@ mod tests {
     }
 
     #[test]
+    fn a_password_is_not_shown() {
+        let config =
+            Config { store: Address::parse("postgres://farm:secret@db/jobs").ok(), ..Config::for_folder(Path::new("a")) };
+        let text = text(&config).unwrap();
+        assert!(text.contains("store = \"postgres://farm@db/jobs\"\n") && !text.contains("secret"), "{text}");
+    }
+
+    #[test]
     fn whatever_is_set_is_read_back() {
         let mut config = Config::for_folder(Path::new("a \"b\"/'c'\\d\t"));
         config.state = "/srv/state of 2".into();
+        config.store = Address::parse("postgres://farm@db/jobs?sslmode=verify-full").ok();
         config.folders.push(FolderConfig {
             name: "scans & more".into(),
             path: "scans".into(),

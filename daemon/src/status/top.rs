@@ -44,8 +44,8 @@ pub(crate) fn run(args: &TopArgs) -> Exit {
 
 fn show(args: &TopArgs, stop: &Stop) -> io::Result<()> {
     loop {
-        let text = match reach::glance(&args.dir) {
-            Ok(glance) => screen(&args.dir, &glance),
+        let text = match reach::glance(&args.dir, None) {
+            Ok(glance) => screen(&args.dir, None, &glance),
             Err(failure) => unknown(&args.dir, &failure.line),
         };
         let (rows, columns) = size();

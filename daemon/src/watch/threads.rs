@@ -23,6 +23,12 @@ pub(super) fn no_thread(source: std::io::Error) -> StoreError {
     StoreError::Io { path: "thread".into(), action: "starting one", source }
 }
 
+/// Has idle slots look when other daemons may have brought something to claim.
+fn hear(context: &Arc<Context>) {
+    let idle = Arc::downgrade(context);
+    context.store.hear(Arc::new(move || idle.upgrade().iter().for_each(|context| context.schedule.news())));
+}
+
 /// The threads that work on jobs.
 pub(super) struct Slots<'s, 'e> {
     scope: &'s Scope<'s, 'e>,
@@ -31,8 +37,9 @@ pub(super) struct Slots<'s, 'e> {
 }
 
 impl<'s, 'e> Slots<'s, 'e> {
-    /// None yet.
+    /// None yet; those to come are woken by what other daemons bring, too.
     pub(super) fn new(scope: &'s Scope<'s, 'e>, context: &'s Arc<Context>) -> Self {
+        hear(context);
         Self { scope, context, threads: Mutex::default() }
     }
 

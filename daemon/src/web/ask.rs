@@ -3,6 +3,7 @@
 use std::sync::Arc;
 use std::time::Duration;
 
+use suture_store::patience::brief;
 use tokio::task::spawn_blocking;
 use tokio::time::timeout;
 
@@ -22,7 +23,7 @@ pub(super) async fn ask<T: Send + 'static>(
     question: impl FnOnce(&Context) -> Result<T, Problem> + Send + 'static,
 ) -> Result<T, Problem> {
     let (context, span) = (Arc::clone(context), tracing::Span::current());
-    match timeout(PATIENCE, spawn_blocking(move || span.in_scope(|| question(&context)))).await {
+    match timeout(PATIENCE, spawn_blocking(move || span.in_scope(|| brief(|| question(&context))))).await {
         Ok(Ok(answer)) => answer,
         // The panic is in the log.
         Ok(Err(_)) => Err(Problem::new(axum::http::StatusCode::INTERNAL_SERVER_ERROR, "an internal error; the log says more")),

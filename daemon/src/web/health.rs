@@ -23,7 +23,8 @@ pub(super) struct Health {
 
 /// `GET /livez`: does the daemon go on?
 pub(super) async fn livez(State(shared): State<Arc<Shared>>) -> Result<Json<Health>, Problem> {
-    if shared.context.pulse.silence() > SILENCE {
+    // While it waits for its database, all that it can do is wait.
+    if shared.context.pulse.silence() > SILENCE && shared.context.store.away().is_none() {
         return Err(Problem::unavailable("the daemon does not go on: a disk may hang"));
     }
     Ok(Json(Health { status: "alive" }))

@@ -72,6 +72,9 @@ impl From<StoreError> for Problem {
             StoreError::Unknown(_) => Self::missing(error.to_string()),
             StoreError::TooLong { .. } => Self::bad(error.to_string()),
             _ if error.is_callers() => Self::conflict(error.to_string()),
+            StoreError::Away { seconds, .. } => {
+                Self::unavailable(format!("the job database has not answered for {seconds} s; try again"))
+            }
             // Paths of this machine are no client's business.
             _ => Self::unavailable("the job store does not answer for now; try again"),
         }

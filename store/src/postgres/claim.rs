@@ -31,6 +31,8 @@ const MOST_TAKEN_BACK: usize = 64;
 pub(super) struct Life {
     pub(super) epoch: Epoch,
     pub(super) daemon: String,
+    /// Only jobs of these hot folders are its business; `None`: all are.
+    pub(super) folders: Option<Vec<String>>,
     /// Says which start of the machine this is, and nothing else.
     pub(super) machine: Arc<dyn Clock>,
     /// In ms.
@@ -76,6 +78,7 @@ pub(super) async fn claim(
             .bind(int(want.size.1))
             .bind(want.alone)
             .bind(shut)
+            .bind(&life.folders)
             .fetch_one(&mut *connection)
             .await?;
         if row.try_get::<Option<i64>, _>("id")?.is_some() {
@@ -111,7 +114,7 @@ pub(super) async fn take_back(connection: &mut PgConnection, life: &Life, shut: 
     for _ in 0..MOST_TAKEN_BACK {
         // Under a lock: a holder that gives a sign just now is either in time, or finds that it was too late.
         let mut transaction = connection.begin().await?;
-        let row = sqlx::query(EXPIRED).bind(life.lease).bind(shut).fetch_optional(&mut *transaction).await?;
+        let row = sqlx::query(EXPIRED).bind(life.lease).bind(shut).bind(&life.folders).fetch_optional(&mut *transaction).await?;
         let Some(row) = row else { return Ok(None) };
         let stored = Stored::read(&row)?;
         let now = Time(number(row.try_get("now")?));
@@ -150,17 +153,23 @@ pub(super) fn inherit(
 }
 
 /// As [`crate::JobStore::has_parked`].
-pub(super) async fn has_parked(connection: &mut PgConnection, shut: &[String]) -> Result<bool, Failure> {
-    Ok(sqlx::query(HAS_PARKED).bind(shut).fetch_one(connection).await?.try_get("has")?)
+pub(super) async fn has_parked(connection: &mut PgConnection, life: &Life, shut: &[String]) -> Result<bool, Failure> {
+    Ok(sqlx::query(HAS_PARKED).bind(shut).bind(&life.folders).fetch_one(connection).await?.try_get("has")?)
 }
 
 /// As [`crate::JobStore::waiting`].
-pub(super) async fn waiting(connection: &mut PgConnection, want: &Filter, shut: &[String]) -> Result<Option<Waiting>, Failure> {
+pub(super) async fn waiting(
+    connection: &mut PgConnection,
+    life: &Life,
+    want: &Filter,
+    shut: &[String],
+) -> Result<Option<Waiting>, Failure> {
     let row = sqlx::query(WAITING)
         .bind(int(want.size.0))
         .bind(int(want.size.1))
         .bind(want.alone)
         .bind(shut)
+        .bind(&life.folders)
         .fetch_one(connection)
         .await?;
     let priority = |name| {

@@ -1,6 +1,7 @@
 //! Connections to the database, few and kept, and calls that outlive its restart.
 
 use std::io;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -10,13 +11,17 @@ use tokio::runtime::{Handle, Runtime};
 use tokio::sync::Semaphore;
 use tokio::time::{sleep, timeout};
 
+use super::outage::Outage;
 use crate::id::Clock;
+use crate::patience::is_hurried;
 use crate::store::StoreError;
 
 /// A connection that does not come about for so long is given up, and tried again.
 const CONNECT: Duration = Duration::from_secs(5);
 /// A call that is not answered for so long is given up with its connection.
 const CALL: Duration = Duration::from_secs(60);
+/// The same of all of a call that is to be brief, its connection included.
+const BRIEF: Duration = Duration::from_secs(2);
 /// First and longest pause before a call is tried again.
 const PAUSES: (Duration, Duration) = (Duration::from_millis(10), Duration::from_secs(1));
 
@@ -55,12 +60,31 @@ impl Failure {
     fn passes(&self) -> bool {
         let Self::Database(error) = self else { return false };
         match error {
+            sqlx::Error::Database(error) => {
+                self.is_outage() || error.code().is_some_and(|code| ["40", "55P03"].iter().any(|class| code.starts_with(class)))
+            }
+            _ => self.is_outage(),
+        }
+    }
+
+    /// Is the database, or the way to it, away?
+    fn is_outage(&self) -> bool {
+        let Self::Database(error) = self else { return false };
+        match error {
             sqlx::Error::Io(_) | sqlx::Error::Protocol(_) | sqlx::Error::Tls(_) => true,
             sqlx::Error::Database(error) => error.code().is_some_and(|code| {
-                let classes = ["08", "40", "53", "55P03", "57P"];
                 // A standby that has not taken over yet refuses to write.
-                classes.iter().any(|class| code.starts_with(class)) || code == "25006"
+                ["08", "53", "57P"].iter().any(|class| code.starts_with(class)) || code == "25006"
             }),
+            _ => false,
+        }
+    }
+
+    /// A certificate that is not trusted: that does not pass by itself, but a server that starts may show another one for a moment.
+    fn is_distrust(&self) -> bool {
+        match self {
+            Self::Database(sqlx::Error::Tls(_)) => true,
+            Self::Database(sqlx::Error::Io(error)) => error.kind() == io::ErrorKind::InvalidData,
             _ => false,
         }
     }
@@ -81,14 +105,31 @@ pub(super) struct Database {
     idle: Mutex<Vec<PgConnection>>,
     permits: Semaphore,
     patience: Duration,
+    pub(super) outage: Outage,
+    /// A connection came about once: what does not pass for a beginner may pass now.
+    was_there: AtomicBool,
     /// Tests set the time; else the database's counts, and no other.
     clock: Option<Arc<dyn Clock>>,
 }
 
 impl Database {
-    pub(super) fn new(options: PgConnectOptions, connections: u32, patience: Duration, clock: Option<Arc<dyn Clock>>) -> Self {
+    /// `place`: where it is, for people.
+    pub(super) fn new(
+        options: PgConnectOptions,
+        place: String,
+        connections: u32,
+        patience: Duration,
+        clock: Option<Arc<dyn Clock>>,
+    ) -> Self {
         let permits = Semaphore::new(usize::try_from(connections.max(1)).unwrap_or(1));
-        Self { options: options.disable_statement_logging(), idle: Mutex::new(Vec::new()), permits, patience, clock }
+        let options = options.disable_statement_logging();
+        let (outage, was_there) = (Outage::new(place), AtomicBool::new(false));
+        Self { options, idle: Mutex::new(Vec::new()), permits, patience, outage, was_there, clock }
+    }
+
+    /// How to reach it, for a connection beside those that are counted.
+    pub(super) fn options(&self) -> PgConnectOptions {
+        self.options.clone()
     }
 
     fn idle(&self) -> std::sync::MutexGuard<'_, Vec<PgConnection>> {
@@ -101,6 +142,7 @@ impl Database {
             Some(connection) => connection,
             None => timeout(CONNECT, self.options.connect()).await.map_err(|_| late())??,
         };
+        self.was_there.store(true, Ordering::Relaxed);
         if let Some(clock) = &self.clock {
             let now = clock.now().0.to_string();
             sqlx::query("SELECT set_config('suture.now', $1, false)").bind(now).execute(&mut connection).await?;
@@ -127,37 +169,56 @@ impl Database {
         }
     }
 
-    /// A call, tried again while the database is away, up to the patience.
+    /// A call, tried again while the database is away, up to the patience; one that is to be brief is given up soon.
     pub(super) async fn call<T>(
         &self,
         again: Again,
+        is_brief: bool,
         call: impl AsyncFn(&mut PgConnection) -> Result<T, Failure>,
     ) -> Result<T, StoreError> {
-        let (began, mut pause, mut told) = (Instant::now(), PAUSES.0, false);
+        let (began, mut pause) = (Instant::now(), PAUSES.0);
         loop {
-            let failure = match self.once(&call).await {
+            if is_brief && self.outage.is_certain() {
+                return Err(self.outage.error());
+            }
+            let once = self.once(&call);
+            let done = if is_brief { timeout(BRIEF, once).await.unwrap_or_else(|_| Err((true, late()))) } else { once.await };
+            let (begun, failure) = match done {
                 Ok(value) => {
-                    if told {
-                        tracing::info!(seconds = began.elapsed().as_secs(), "The job database answers again.");
-                    }
+                    self.outage.end();
                     return Ok(value);
                 }
-                Err((begun, failure)) if !failure.passes() || (begun && again == Again::No) => return Err(failure.into()),
-                Err((_, failure)) => failure,
+                Err(failed) => failed,
             };
-            // Connections of before the failure are as dead as this one.
-            self.idle().clear();
-            if began.elapsed() >= self.patience {
+            let is_outage = failure.is_outage();
+            if !is_outage {
+                self.outage.end();
+            }
+            if failure.is_distrust() && !self.was_there.load(Ordering::Relaxed) {
+                return Err(self.outage.distrust(&told(&failure.into())));
+            }
+            if !failure.passes() || (begun && again == Again::No) {
                 return Err(failure.into());
             }
-            if pause >= PAUSES.1 && !std::mem::replace(&mut told, true) {
-                let error = StoreError::from(failure);
-                tracing::warn!(%error, patience_s = self.patience.as_secs(), "The job database does not answer; the call waits for it.");
+            // Connections of before the failure are as dead as this one.
+            self.idle().clear();
+            let error = StoreError::from(failure);
+            if is_outage {
+                self.outage.go_on(&told(&error));
+            }
+            let patience = if is_brief || is_hurried() { BRIEF.min(self.patience) } else { self.patience };
+            if began.elapsed() >= patience {
+                return Err(if is_outage { self.outage.error() } else { error });
             }
             sleep(pause).await;
             pause = (2 * pause).min(PAUSES.1);
         }
     }
+}
+
+/// Why, without the words that go before it.
+fn told(error: &StoreError) -> String {
+    std::error::Error::source(error).map_or_else(|| error.to_string(), ToString::to_string)
 }
 
 fn late() -> Failure {

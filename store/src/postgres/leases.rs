@@ -5,11 +5,13 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
+use sqlx::postgres::PgConnection;
 use tokio::runtime::Runtime;
 
 use super::claim::{Life, extend};
-use super::database::{Again, Database, wait};
-use crate::id::{JobId, Token};
+use super::database::{Again, Database, Failure, wait};
+use super::row::int;
+use crate::id::{Epoch, JobId, Token};
 use crate::store::Claim;
 
 /// The claims that this life has given out and that have not ended. One whose answer was lost on the way is not among them, and runs out.
@@ -37,16 +39,34 @@ impl Claims {
     }
 }
 
-/// Begins the leases of all claims anew, again and again, until the store ends: as long as the daemon lives, so do its claims.
+/// The daemon lives.
+async fn see(connection: &mut PgConnection, life: &Life) -> Result<(), Failure> {
+    let seen = sqlx::query("UPDATE lives SET seen = suture_now() WHERE epoch = $1 AND NOT is_over").bind(int(life.epoch.0));
+    seen.execute(connection).await?;
+    Ok(())
+}
+
+/// The daemon ends of itself: its folders are free at once.
+pub(super) async fn end(connection: &mut PgConnection, life: &Life) -> Result<(), Failure> {
+    let over = sqlx::query("UPDATE lives SET is_over = true WHERE epoch = $1").bind(int(life.epoch.0));
+    over.execute(connection).await?;
+    Ok(())
+}
+
+/// Gives a sign of life, and begins the leases of all claims anew, again and again, until the store ends: as long as the daemon lives, so do its
+/// claims.
 pub(super) fn keep_leases(runtime: &Runtime, database: &Database, life: &Life, claims: &Claims, ended: &Receiver<Arc<Runtime>>) {
     let pause = Duration::from_millis(life.lease.unsigned_abs() / 4);
     while let Err(RecvTimeoutError::Timeout) = ended.recv_timeout(pause) {
-        let tokens = claims.tokens();
-        if tokens.is_empty() {
+        if life.epoch == Epoch(0) {
             continue;
         }
-        let kept =
-            wait(runtime, async || database.call(Again::Yes, async |connection| extend(connection, life, &tokens).await).await);
+        let tokens = claims.tokens();
+        let keep = async |connection: &mut PgConnection| {
+            see(connection, life).await?;
+            if tokens.is_empty() { Ok(0) } else { extend(connection, life, &tokens).await }
+        };
+        let kept = wait(runtime, async || database.call(Again::Yes, false, keep).await);
         if let Err(error) = kept {
             tracing::warn!(%error, "The leases of this daemon's jobs could not be kept; others may take them.");
         }

@@ -30,24 +30,27 @@ pub(super) async fn get(connection: &mut PgConnection, id: JobId) -> Result<Opti
     row.map(|row| Stored::read(&row).map(|stored| stored.job)).transpose()
 }
 
+/// Hot folders whose jobs are asked for; `None`: of all.
+type Served<'a> = Option<&'a [String]>;
+
 /// As [`crate::JobStore::list`].
-pub(super) async fn list(connection: &mut PgConnection, query: &Query) -> Result<Vec<Job>, Failure> {
+pub(super) async fn list(connection: &mut PgConnection, served: Served<'_>, query: &Query) -> Result<Vec<Job>, Failure> {
     let most = if query.limit == 0 { usize::MAX } else { query.limit };
     let sql = "SELECT id, seq, record, epoch, token, claim_token, claim_boot, claim_at FROM jobs
-        WHERE id > $1 AND kind = ANY ($2) ORDER BY id LIMIT $3";
-    let rows = sqlx::query(sql).bind(int(query.after.0)).bind(names(&query.kinds)).bind(limit(most)).fetch_all(connection);
-    jobs(&rows.await?)
+        WHERE id > $1 AND kind = ANY ($2) AND ($4::text[] IS NULL OR folder = ANY ($4)) ORDER BY id LIMIT $3";
+    let rows = sqlx::query(sql).bind(int(query.after.0)).bind(names(&query.kinds)).bind(limit(most)).bind(served);
+    jobs(&rows.fetch_all(connection).await?)
 }
 
 /// As [`crate::JobStore::page`]. Of jobs of other folders only the numbers are read.
-pub(super) async fn page(connection: &mut PgConnection, look: &Look) -> Result<Page, Failure> {
+pub(super) async fn page(connection: &mut PgConnection, served: Served<'_>, look: &Look) -> Result<Page, Failure> {
     let mut page = Page::default();
     if look.limit == 0 {
         return Ok(page);
     }
-    let most = if look.folder.is_some() { PAGE_READS } else { look.limit.min(PAGE_READS) };
+    let most = if look.folder.is_some() || served.is_some() { PAGE_READS } else { look.limit.min(PAGE_READS) };
     let sql = "WITH seen AS MATERIALIZED (
-            SELECT id, $3::text IS NULL OR folder = $3 AS fits FROM jobs WHERE id < $1 AND kind = ANY ($2) ORDER BY id DESC LIMIT $4
+            SELECT id, ($3::text IS NULL OR folder = $3) AND ($6::text[] IS NULL OR folder = ANY ($6)) AS fits FROM jobs WHERE id < $1 AND kind = ANY ($2) ORDER BY id DESC LIMIT $4
         ), wanted AS MATERIALIZED (SELECT id FROM seen WHERE fits ORDER BY id DESC LIMIT $5)
         SELECT s.id AS number, j.id, j.seq, j.record, j.epoch, j.token, j.claim_token, j.claim_boot, j.claim_at
         FROM seen s LEFT JOIN wanted w ON w.id = s.id LEFT JOIN jobs j ON j.id = w.id ORDER BY s.id DESC";
@@ -57,6 +60,7 @@ pub(super) async fn page(connection: &mut PgConnection, look: &Look) -> Result<P
         .bind(&look.folder)
         .bind(limit(most))
         .bind(limit(look.limit))
+        .bind(served)
         .fetch_all(connection)
         .await?;
     for (read, row) in rows.iter().enumerate() {
@@ -83,17 +87,23 @@ pub(super) async fn find(connection: &mut PgConnection, source: &Source) -> Resu
 }
 
 /// As [`crate::JobStore::results`].
-pub(super) async fn results(connection: &mut PgConnection, size: u64, recipe: Option<Recipe>) -> Result<Vec<Job>, Failure> {
+pub(super) async fn results(
+    connection: &mut PgConnection,
+    served: Served<'_>,
+    size: u64,
+    recipe: Option<Recipe>,
+) -> Result<Vec<Job>, Failure> {
     let sql = "SELECT id, seq, record, epoch, token, claim_token, claim_boot, claim_at FROM jobs
-        WHERE size = $1 AND recipe IS NOT NULL AND ($2::bigint IS NULL OR recipe = $2) ORDER BY id DESC LIMIT $3";
+        WHERE size = $1 AND recipe IS NOT NULL AND ($2::bigint IS NULL OR recipe = $2) AND ($4::text[] IS NULL OR folder = ANY ($4)) ORDER BY id DESC LIMIT $3";
     let most = if recipe.is_some() { MOST_RESULTS } else { 1 };
     let recipe = recipe.map(|recipe| recipe.0.cast_signed());
-    jobs(&sqlx::query(sql).bind(int(size)).bind(recipe).bind(limit(most)).fetch_all(connection).await?)
+    jobs(&sqlx::query(sql).bind(int(size)).bind(recipe).bind(limit(most)).bind(served).fetch_all(connection).await?)
 }
 
 /// As [`crate::JobStore::counts`].
-pub(super) async fn counts(connection: &mut PgConnection) -> Result<Vec<(Kind, u64)>, Failure> {
-    let rows = sqlx::query("SELECT kind, count(*) AS count FROM jobs GROUP BY kind").fetch_all(connection).await?;
+pub(super) async fn counts(connection: &mut PgConnection, served: Served<'_>) -> Result<Vec<(Kind, u64)>, Failure> {
+    let sql = "SELECT kind, count(*) AS count FROM jobs WHERE $1::text[] IS NULL OR folder = ANY ($1) GROUP BY kind";
+    let rows = sqlx::query(sql).bind(served).fetch_all(connection).await?;
     let mut counts = Kind::ALL.map(|kind| (kind, 0)).to_vec();
     for row in rows {
         let name: String = row.try_get("kind")?;

@@ -26,7 +26,7 @@ pub(super) fn is_plain(schema: &str) -> bool {
 /// Brings the schema to the version that this program knows. Whoever may not make tables can only find it there.
 pub(super) async fn migrate(connection: &mut PgConnection, schema: &str) -> Result<(), Failure> {
     // Who is not to wait for a lock, and may not make a schema, need not.
-    if is_there(connection, schema).await? && steps(connection, schema).await? == MIGRATIONS.len() {
+    if is_current(connection, schema).await? {
         return Ok(());
     }
     let mut transaction = connection.begin().await?;
@@ -46,6 +46,11 @@ pub(super) async fn migrate(connection: &mut PgConnection, schema: &str) -> Resu
         transaction.execute(note).await?;
     }
     Ok(transaction.commit().await?)
+}
+
+/// Is the schema there, in the version that this program knows?
+pub(super) async fn is_current(connection: &mut PgConnection, schema: &str) -> Result<bool, Failure> {
+    Ok(is_there(connection, schema).await? && steps(connection, schema).await? == MIGRATIONS.len())
 }
 
 async fn is_there(connection: &mut PgConnection, schema: &str) -> Result<bool, Failure> {

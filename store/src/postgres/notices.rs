@@ -3,6 +3,7 @@
 use sqlx::postgres::{PgConnection, PgRow};
 use sqlx::{Connection, Row};
 
+use super::claim::Life;
 use super::database::Failure;
 use super::outbox;
 use super::row::{int, number};
@@ -14,33 +15,54 @@ use crate::record;
 /// Removes what everyone has heard.
 const PRUNE: &str = "DELETE FROM outbox WHERE seq <= (SELECT coalesce(min(heard), 9223372036854775807) FROM subscribers)";
 
-/// As [`crate::JobStore::subscribe`].
-pub(super) async fn subscribe(connection: &mut PgConnection, names: &[String]) -> Result<(), Failure> {
+/// What a daemon tells: ends of jobs of its folders and news of them, and its own news. Its parameters: $1 daemon, $2 folders.
+macro_rules! told_by_daemon {
+    () => {
+        "($2::text[] IS NULL OR coalesce(o.folder = ANY ($2), o.daemon = $1, true))"
+    };
+}
+
+/// As [`crate::JobStore::subscribe`]. Each daemon has subscribers of its own.
+pub(super) async fn subscribe(connection: &mut PgConnection, life: &Life, names: &[String]) -> Result<(), Failure> {
     let mut transaction = connection.begin().await?;
     let last = outbox::alone(&mut transaction).await?;
-    sqlx::query("DELETE FROM subscribers WHERE name <> ALL ($1)").bind(names).execute(&mut *transaction).await?;
-    sqlx::query("INSERT INTO subscribers (name, heard) SELECT DISTINCT name, $2::bigint FROM unnest($1::text[]) name ON CONFLICT DO NOTHING")
-        .bind(names)
-        .bind(int(last.0))
-        .execute(&mut *transaction)
-        .await?;
+    let gone = "DELETE FROM subscribers WHERE daemon = $1 AND name <> ALL ($2)";
+    sqlx::query(gone).bind(&life.daemon).bind(names).execute(&mut *transaction).await?;
+    let new = "INSERT INTO subscribers (daemon, name, heard)
+        SELECT DISTINCT $1, name, $3::bigint FROM unnest($2::text[]) name ON CONFLICT DO NOTHING";
+    sqlx::query(new).bind(&life.daemon).bind(names).bind(int(last.0)).execute(&mut *transaction).await?;
     sqlx::query(PRUNE).execute(&mut *transaction).await?;
     Ok(transaction.commit().await?)
 }
 
-/// As [`crate::JobStore::notices`].
-pub(super) async fn notices(connection: &mut PgConnection, name: &str, most: usize) -> Result<Vec<Notice>, Failure> {
-    const SOME: &str = "SELECT heard FROM subscribers WHERE name = $1 AND EXISTS (SELECT 1 FROM outbox WHERE seq > heard)";
-    if most == 0 || sqlx::query(SOME).bind(name).fetch_optional(&mut *connection).await?.is_none() {
+/// As [`crate::JobStore::notices`]. Where none of the rest is this daemon's to tell, all of it counts as heard, so that it may go.
+pub(super) async fn notices(connection: &mut PgConnection, life: &Life, name: &str, most: usize) -> Result<Vec<Notice>, Failure> {
+    const SOME: &str = "SELECT heard FROM subscribers
+        WHERE daemon = $1 AND name = $2 AND EXISTS (SELECT 1 FROM outbox WHERE seq > heard)";
+    let some = sqlx::query(SOME).bind(&life.daemon).bind(name);
+    if most == 0 || some.fetch_optional(&mut *connection).await?.is_none() {
         return Ok(Vec::new());
     }
     let mut transaction = connection.begin().await?;
     let last = outbox::alone(&mut transaction).await?;
     transaction.commit().await?;
-    let entries = "SELECT o.seq, o.job, o.record FROM outbox o JOIN subscribers s ON s.name = $1 AND o.seq > s.heard
-        WHERE o.seq <= $2 ORDER BY o.seq LIMIT $3";
-    let most = int(u64::try_from(most).unwrap_or(u64::MAX));
-    let rows = sqlx::query(entries).bind(name).bind(int(last.0)).bind(most).fetch_all(connection).await?;
+    let entries = concat!(
+        "SELECT o.seq, o.job, o.record FROM outbox o JOIN subscribers s ON s.daemon = $1 AND s.name = $3 AND o.seq > s.heard
+        WHERE o.seq <= $4 AND ",
+        told_by_daemon!(),
+        " ORDER BY o.seq LIMIT $5"
+    );
+    let rows = sqlx::query(entries)
+        .bind(&life.daemon)
+        .bind(&life.folders)
+        .bind(name)
+        .bind(int(last.0))
+        .bind(int(u64::try_from(most).unwrap_or(u64::MAX)))
+        .fetch_all(&mut *connection)
+        .await?;
+    if rows.is_empty() {
+        acknowledge(connection, life, name, last).await?;
+    }
     rows.iter().map(entry).collect()
 }
 
@@ -56,8 +78,9 @@ pub(super) fn entry(row: &PgRow) -> Result<Notice, Failure> {
 }
 
 /// As [`crate::JobStore::acknowledge`].
-pub(super) async fn acknowledge(connection: &mut PgConnection, name: &str, seq: Seq) -> Result<(), Failure> {
-    let heard = sqlx::query("UPDATE subscribers SET heard = $2 WHERE name = $1 AND heard < $2").bind(name).bind(int(seq.0));
+pub(super) async fn acknowledge(connection: &mut PgConnection, life: &Life, name: &str, seq: Seq) -> Result<(), Failure> {
+    let sql = "UPDATE subscribers SET heard = $3 WHERE daemon = $1 AND name = $2 AND heard < $3";
+    let heard = sqlx::query(sql).bind(&life.daemon).bind(name).bind(int(seq.0));
     if heard.execute(&mut *connection).await?.rows_affected() > 0 {
         sqlx::query(PRUNE).execute(connection).await?;
     }
@@ -65,7 +88,11 @@ pub(super) async fn acknowledge(connection: &mut PgConnection, name: &str, seq: 
 }
 
 /// As [`crate::JobStore::backlog`].
-pub(super) async fn backlog(connection: &mut PgConnection, name: &str) -> Result<u64, Failure> {
-    let count = "SELECT count(*) AS count FROM outbox o JOIN subscribers s ON s.name = $1 AND o.seq > s.heard";
-    Ok(number(sqlx::query(count).bind(name).fetch_one(connection).await?.try_get("count")?))
+pub(super) async fn backlog(connection: &mut PgConnection, life: &Life, name: &str) -> Result<u64, Failure> {
+    let count = concat!(
+        "SELECT count(*) AS count FROM outbox o JOIN subscribers s ON s.daemon = $1 AND s.name = $3 AND o.seq > s.heard WHERE ",
+        told_by_daemon!()
+    );
+    let count = sqlx::query(count).bind(&life.daemon).bind(&life.folders).bind(name);
+    Ok(number(count.fetch_one(connection).await?.try_get("count")?))
 }

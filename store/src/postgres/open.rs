@@ -14,13 +14,16 @@ use tokio::runtime::{Builder, Runtime};
 use super::claim::Life;
 use super::database::{Again, Database, Failure, wait};
 use super::leases::{Claims, keep_leases};
-use super::migrate::{is_plain, migrate};
+use super::marks::begin_marks;
+use super::migrate::{is_current, is_plain, migrate};
 use super::row::number;
+use crate::address::Address;
 use crate::id::{Clock, Epoch, SystemClock};
+use crate::patience::is_brief;
 use crate::store::StoreError;
 
 /// A database that many daemons share, and who this one is.
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 pub struct Shared {
     /// `postgres://user@host/database`, with what its address may say of TLS (`sslmode=verify-full`, `sslrootcert=…`). The database itself, or a
     /// pooler that gives whole sessions: statements are prepared.
@@ -29,6 +32,9 @@ pub struct Shared {
     pub schema: String,
     /// The name of this daemon, of which there is one at a time: a life that begins under it ends those before.
     pub daemon: String,
+    /// The hot folders that it serves, by name, of which no other daemon serves one; the store then knows jobs of these alone, but for one that is
+    /// asked for by its number. `None`: jobs of all folders.
+    pub folders: Option<Vec<String>>,
     /// Connections at most.
     pub connections: u32,
     /// A daemon that gives no sign for so long has lost its jobs.
@@ -44,10 +50,21 @@ impl Shared {
             url: url.to_owned(),
             schema: "suture".to_owned(),
             daemon: daemon.to_owned(),
+            folders: None,
             connections: 8,
             lease: Duration::from_secs(60),
             patience: Duration::from_secs(300),
         }
+    }
+
+    /// Where it is, for people, without a password.
+    pub(super) fn place(&self) -> String {
+        Address::parse(&self.url).map_or_else(|_| "the database".to_owned(), |address| address.to_string())
+    }
+
+    /// In ms.
+    fn lease(&self) -> i64 {
+        i64::try_from(self.lease.as_millis()).unwrap_or(i64::MAX / 4)
     }
 
     fn unusable(&self, reason: &str, advice: &str) -> StoreError {
@@ -56,7 +73,10 @@ impl Shared {
     }
 
     fn options(&self) -> Result<PgConnectOptions, StoreError> {
-        let options = PgConnectOptions::from_str(&self.url).map_err(|error| StoreError::Backend(Box::new(error)))?;
+        let wrong = |error: sqlx::Error| {
+            self.unusable(&format!("its address is wrong: {error}"), "write it as postgres://user@host/database")
+        };
+        let options = PgConnectOptions::from_str(&self.url).map_err(wrong)?;
         Ok(options.application_name("suture").options([
             ("search_path", self.schema.as_str()),
             // A daemon that is stopped in the middle of a transaction must not keep others from their rows.
@@ -85,31 +105,48 @@ pub(super) struct Begun {
     pub(super) database: Arc<Database>,
     pub(super) life: Life,
     pub(super) claims: Arc<Claims>,
+    pub(super) channel: String,
 }
 
-/// Begins a life; with a clock, that one sets the time of all that is done in the schema.
-pub(super) fn begin(shared: &Shared, clock: Option<Arc<dyn Clock>>) -> Result<Begun, StoreError> {
+/// Who opens the store.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum As {
+    /// Whoever is going to claim jobs.
+    Daemon,
+    /// Whoever makes the schema, and nothing else.
+    Owner,
+    /// Whoever looks, or says what is to become of jobs: nothing is made, and no life begins or ends.
+    Visitor,
+}
+
+/// Opens the store, for a daemon with a life that begins; with a clock, that one sets the time of all that is done in the schema.
+pub(super) fn begin(shared: &Shared, as_what: As, clock: Option<Arc<dyn Clock>>) -> Result<Begun, StoreError> {
     if !is_plain(&shared.schema) {
         return Err(
             shared.unusable("that is no name for a schema", "use small letters, digits and `_`, at most 48, a letter first")
         );
     }
     let machine = clock.clone().unwrap_or_else(|| Arc::new(SystemClock));
-    let database = Arc::new(Database::new(shared.options()?, shared.connections, shared.patience, clock.clone()));
+    let database = Arc::new(Database::new(shared.options()?, shared.place(), shared.connections, shared.patience, clock.clone()));
     let runtime = Builder::new_multi_thread().worker_threads(1).thread_name("job-database").enable_all().build();
     let runtime = Arc::new(runtime.map_err(failed)?);
     let epoch = wait(&runtime, async || {
         // Half-made is not made: each part sees for itself what is left to do.
-        database.call(Again::Yes, async |connection| begin_life(connection, shared, clock.is_some()).await).await
+        let begin = async |connection: &mut PgConnection| match as_what {
+            As::Daemon => begin_life(connection, shared, clock.is_some()).await,
+            As::Owner => migrate(connection, &shared.schema).await.map(|()| Epoch(0)),
+            As::Visitor => must_be_there(connection, shared).await.map(|()| Epoch(0)),
+        };
+        database.call(Again::Yes, is_brief(), begin).await
     })?;
-    let lease = i64::try_from(shared.lease.as_millis()).unwrap_or(i64::MAX / 4);
-    let life = Life { epoch, daemon: shared.daemon.clone(), machine, lease };
+    let (daemon, folders) = (shared.daemon.clone(), shared.folders.clone());
+    let life = Life { epoch, daemon, folders, machine, lease: shared.lease() };
     let claims = Arc::new(Claims::default());
     let (end, ended) = channel();
     let keeper = (Arc::clone(&runtime), Arc::clone(&database), life.clone(), Arc::clone(&claims));
     let keep = move || keep_leases(&keeper.0, &keeper.1, &keeper.2, &keeper.3, &ended);
     std::thread::Builder::new().name("job-leases".into()).spawn(keep).map_err(failed)?;
-    Ok(Begun { runtime, end, database, life, claims })
+    Ok(Begun { runtime, end, database, life, claims, channel: format!("{}_news", shared.schema) })
 }
 
 fn failed(source: std::io::Error) -> StoreError {
@@ -134,16 +171,41 @@ async fn begin_life(connection: &mut PgConnection, shared: &Shared, is_test: boo
         sqlx::raw_sql(clock).execute(&mut *connection).await?;
     }
     let mut transaction = connection.begin().await?;
-    let lease = i64::try_from(shared.lease.as_millis()).unwrap_or(i64::MAX / 4);
+    let lease = shared.lease();
+    // Whoever begins at the same time waits here, and sees this life.
     super::submit::head(&mut transaction).await?;
+    must_be_alone(&mut transaction, shared).await?;
+    begin_marks(&mut transaction, &shared.daemon).await?;
     sqlx::query("UPDATE lives SET is_over = true WHERE daemon = $1").bind(&shared.daemon).execute(&mut *transaction).await?;
     // What they held is void at once; whoever does not come to recover it leaves it to others.
     let void = "UPDATE jobs SET token = NULL, lease_until = suture_now() + $2 WHERE epoch IN (SELECT epoch FROM lives WHERE daemon = $1)";
     sqlx::query(void).bind(&shared.daemon).bind(lease).execute(&mut *transaction).await?;
     let old = "DELETE FROM lives l WHERE is_over AND NOT EXISTS (SELECT 1 FROM jobs j WHERE j.epoch = l.epoch)";
     sqlx::query(old).execute(&mut *transaction).await?;
-    let new = "INSERT INTO lives (daemon, began) VALUES ($1, suture_now()) RETURNING epoch";
-    let epoch: i64 = sqlx::query(new).bind(&shared.daemon).fetch_one(&mut *transaction).await?.try_get("epoch")?;
+    let new = "INSERT INTO lives (daemon, folders, began, seen) VALUES ($1, $2, suture_now(), suture_now()) RETURNING epoch";
+    let new = sqlx::query(new).bind(&shared.daemon).bind(&shared.folders);
+    let epoch: i64 = new.fetch_one(&mut *transaction).await?.try_get("epoch")?;
     transaction.commit().await?;
     Ok(Epoch(number(epoch)))
+}
+
+/// Refuses where a daemon that lives serves a folder of that name. Who gave no sign while the database was away is not dead.
+async fn must_be_alone(connection: &mut PgConnection, shared: &Shared) -> Result<(), Failure> {
+    let sql = "SELECT l.daemon, f.folder FROM lives l CROSS JOIN LATERAL unnest(l.folders) f (folder)
+        WHERE NOT l.is_over AND l.daemon <> $1 AND f.folder = ANY ($2) AND greatest(l.seen, suture_up_since()) + $3 > suture_now()
+        ORDER BY l.epoch, f.folder LIMIT 1";
+    let other = sqlx::query(sql).bind(&shared.daemon).bind(&shared.folders).bind(shared.lease());
+    match other.fetch_optional(connection).await? {
+        Some(row) => Err(StoreError::Served { folder: row.try_get("folder")?, by: row.try_get("daemon")? }.into()),
+        None => Ok(()),
+    }
+}
+
+/// Refuses where no store was made yet.
+async fn must_be_there(connection: &mut PgConnection, shared: &Shared) -> Result<(), Failure> {
+    if is_current(connection, &shared.schema).await? {
+        return Ok(());
+    }
+    let advice = "the first `suture watch --store` makes it, if its user may; else the owner of the database does, see `suture store role`";
+    Err(shared.unusable("there is no job store of this version", advice).into())
 }

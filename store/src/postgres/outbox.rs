@@ -10,6 +10,8 @@ use sqlx::{Executor, Row};
 use super::database::Failure;
 use super::row::{int, number};
 use crate::id::{JobId, Seq};
+use crate::news::{News, Word};
+use crate::record;
 
 /// First half of the key of every lock that the store takes in the database, also in `suture_write`; the other is the schema's.
 pub(super) const LOCKS: i32 = 0x5375_7475;
@@ -34,13 +36,14 @@ pub(super) fn key(job: Option<JobId>) -> [u8; 8] {
     job.unwrap_or_default().0.to_be_bytes()
 }
 
-/// Puts an entry in, if anyone is to hear of it.
-pub(super) async fn put(connection: &mut PgConnection, seq: Seq, job: Option<JobId>, record: Vec<u8>) -> Result<(), Failure> {
-    sqlx::query("INSERT INTO outbox (seq, job, record) SELECT $1, $2, $3 WHERE EXISTS (SELECT 1 FROM subscribers)")
-        .bind(int(seq.0))
-        .bind(job.map(|job| int(job.0)))
-        .bind(record)
-        .execute(connection)
-        .await?;
+/// Puts news in that `daemon` tells, if anyone is to hear of them.
+pub(super) async fn put(connection: &mut PgConnection, daemon: &str, word: &Word) -> Result<(), Failure> {
+    let folder = match &word.news {
+        News::FolderAway { folder, .. } | News::FolderBack { folder } => Some(folder),
+        News::Night { .. } => None,
+    };
+    let sql = "INSERT INTO outbox (seq, folder, daemon, record) SELECT $1, $2, $3, $4 WHERE EXISTS (SELECT 1 FROM subscribers)";
+    let record = record::encode_word(&key(None), word)?;
+    sqlx::query(sql).bind(int(word.seq.0)).bind(folder).bind(daemon).bind(record).execute(connection).await?;
     Ok(())
 }

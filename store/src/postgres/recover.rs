@@ -15,11 +15,13 @@ use crate::job::{Event, Job, State, Testimony};
 use crate::store::{Claim, Recovered, StoreError};
 
 const ORPHANS: &str = "SELECT j.id, seq, record, j.epoch, token, claim_token, claim_boot, claim_at
-    FROM jobs j JOIN lives l ON l.epoch = j.epoch WHERE l.daemon = $1 AND l.epoch < $2 ORDER BY j.id";
+    FROM jobs j JOIN lives l ON l.epoch = j.epoch WHERE l.daemon = $1 AND l.epoch < $2 AND ($3::text[] IS NULL OR j.folder = ANY ($3))
+    ORDER BY j.id";
 const ORPHANS_ALONE: &str = "SELECT j.id, seq, record, j.epoch, token, claim_token, claim_boot, claim_at
-    FROM jobs j JOIN lives l ON l.epoch = j.epoch WHERE l.daemon = $1 AND l.epoch < $2 ORDER BY j.id FOR UPDATE OF j";
+    FROM jobs j JOIN lives l ON l.epoch = j.epoch WHERE l.daemon = $1 AND l.epoch < $2 AND ($3::text[] IS NULL OR j.folder = ANY ($3))
+    ORDER BY j.id FOR UPDATE OF j";
 const PARKED: &str = "SELECT id, seq, record, epoch, token, claim_token, claim_boot, claim_at
-    FROM jobs WHERE kind = 'parked' ORDER BY id FOR UPDATE";
+    FROM jobs WHERE kind = 'parked' AND ($1::text[] IS NULL OR folder = ANY ($1)) ORDER BY id FOR UPDATE";
 
 /// What is held against each orphan.
 #[derive(Default)]
@@ -31,7 +33,7 @@ fn read(rows: &[PgRow]) -> Result<Vec<Stored>, Failure> {
 
 /// Jobs that earlier lives of this daemon hold.
 pub(super) async fn orphans(connection: &mut PgConnection, life: &Life) -> Result<Vec<Job>, Failure> {
-    let rows = sqlx::query(ORPHANS).bind(&life.daemon).bind(int(life.epoch.0)).fetch_all(connection).await?;
+    let rows = sqlx::query(ORPHANS).bind(&life.daemon).bind(int(life.epoch.0)).bind(&life.folders).fetch_all(connection).await?;
     Ok(read(&rows)?.into_iter().map(|stored| stored.job).collect())
 }
 
@@ -57,7 +59,12 @@ pub(super) async fn take_back(
 ) -> Result<Vec<Recovered>, Failure> {
     let mut transaction = connection.begin().await?;
     let (_, now) = head(&mut transaction).await?;
-    let rows = sqlx::query(ORPHANS_ALONE).bind(&life.daemon).bind(int(life.epoch.0)).fetch_all(&mut *transaction).await?;
+    let rows = sqlx::query(ORPHANS_ALONE)
+        .bind(&life.daemon)
+        .bind(int(life.epoch.0))
+        .bind(&life.folders)
+        .fetch_all(&mut *transaction)
+        .await?;
     let orphans = read(&rows)?;
     let tokens = numbers(&mut transaction, orphans.len()).await?;
     let mut recovered = Vec::with_capacity(orphans.len());
@@ -75,7 +82,7 @@ pub(super) async fn take_back(
 }
 
 async fn wake_parked(transaction: &mut PgTransaction<'_>, life: &Life, now: Time) -> Result<(), Failure> {
-    let rows = sqlx::query(PARKED).fetch_all(&mut **transaction).await?;
+    let rows = sqlx::query(PARKED).bind(&life.folders).fetch_all(&mut **transaction).await?;
     for stored in read(&rows)? {
         let id = stored.job.id;
         let after = stored.job.after(&Event::Retry, now).map_err(|source| StoreError::Illegal { id, source })?;

@@ -74,6 +74,9 @@ async fn try_submit(transaction: &mut PgTransaction<'_>, found: &[Submission]) -
         answers.push(Submitted { id, new: true });
     }
     insert(transaction, &new, true, last).await?;
+    if new.iter().any(|job| job.kind() != Kind::Noticed) {
+        sqlx::query("SELECT suture_news()").execute(&mut **transaction).await?;
+    }
     Ok(Some(answers))
 }
 

@@ -14,10 +14,11 @@ mod lost;
 mod order;
 mod outage;
 mod schema;
+mod served;
 mod server;
 mod transfer;
 
-use server::{Server, server};
+use server::{Schemas, Server, server};
 
 struct OnPostgres {
     shared: Shared,

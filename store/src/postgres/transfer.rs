@@ -8,6 +8,7 @@ use sqlx::{Connection, Row};
 use super::claim::Life;
 use super::database::Failure;
 use super::look::list;
+use super::marks::begin_marks;
 use super::notices::entry;
 use super::outbox;
 use super::row::{Columns, Stored, int, number};
@@ -32,11 +33,12 @@ async fn pairs(transaction: &mut PgTransaction<'_>, sql: &'static str) -> Result
 pub(super) async fn holdings(connection: &mut PgConnection) -> Result<Holdings, Failure> {
     let mut transaction = connection.begin().await?;
     sqlx::query("SET TRANSACTION ISOLATION LEVEL REPEATABLE READ READ ONLY").execute(&mut *transaction).await?;
-    let sql = "SELECT last_job, unfilled, night, (SELECT CASE WHEN is_called THEN last_value ELSE 0 END FROM transitions) AS seq FROM head";
+    let sql = "SELECT last_job, coalesce((SELECT bool_or(unfilled) FROM daemons), unfilled) AS unfilled,
+        coalesce((SELECT max(night) FROM daemons), night) AS night, (SELECT CASE WHEN is_called THEN last_value ELSE 0 END FROM transitions) AS seq FROM head";
     let row = sqlx::query(sql).fetch_one(&mut *transaction).await?;
     let night: Option<i64> = row.try_get("night")?;
     let away = pairs(&mut transaction, "SELECT folder, since FROM away").await?;
-    let subscribers = pairs(&mut transaction, "SELECT name, heard FROM subscribers").await?;
+    let subscribers = pairs(&mut transaction, "SELECT name, min(heard) FROM subscribers GROUP BY name").await?;
     let marks = Marks {
         last_job: crate::id::JobId(number(row.try_get("last_job")?)),
         seq: Seq(number(row.try_get("seq")?)),
@@ -45,7 +47,7 @@ pub(super) async fn holdings(connection: &mut PgConnection) -> Result<Holdings, 
         away: away.into_iter().map(|(folder, since)| (folder, Time(since))).collect(),
         subscribers: subscribers.into_iter().map(|(name, heard)| (name, Seq(heard))).collect(),
     };
-    let jobs = list(&mut transaction, &Query::default()).await?;
+    let jobs = list(&mut transaction, None, &Query::default()).await?;
     let rows = sqlx::query("SELECT seq, job, record FROM outbox ORDER BY seq").fetch_all(&mut *transaction).await?;
     let notices = rows.iter().map(entry).collect::<Result<_, _>>()?;
     transaction.rollback().await?;
@@ -68,7 +70,8 @@ pub(super) async fn take_over(connection: &mut PgConnection, life: &Life, holdin
         .await?;
     let jobs: Vec<Job> = holdings.jobs.iter().map(orphaned).collect();
     if jobs.iter().any(|job| job.hold().is_some()) {
-        let sql = "INSERT INTO lives (epoch, daemon, began, is_over) OVERRIDING SYSTEM VALUE VALUES (0, $1, suture_now(), true)";
+        let sql = "INSERT INTO lives (epoch, daemon, began, seen, is_over) OVERRIDING SYSTEM VALUE VALUES (0, $1, suture_now(), 0, true)
+            ON CONFLICT DO NOTHING";
         sqlx::query(sql).bind(&life.daemon).execute(&mut *transaction).await?;
     }
     for chunk in jobs.chunks(CHUNK) {
@@ -85,23 +88,26 @@ pub(super) async fn take_over(connection: &mut PgConnection, life: &Life, holdin
             .execute(&mut *transaction)
             .await?;
     }
-    put_marks(&mut transaction, marks).await?;
-    put_notices(&mut transaction, &holdings.notices).await?;
+    put_marks(&mut transaction, life, marks).await?;
+    put_notices(&mut transaction, life, &holdings.notices).await?;
     Ok(transaction.commit().await?)
 }
 
-async fn put_marks(transaction: &mut PgTransaction<'_>, marks: &Marks) -> Result<(), Failure> {
+/// The marks become those of the daemon that takes over, and what daemons to come begin with.
+async fn put_marks(transaction: &mut PgTransaction<'_>, life: &Life, marks: &Marks) -> Result<(), Failure> {
     sqlx::query("UPDATE head SET last_job = greatest(last_job, $1), unfilled = $2, night = $3")
         .bind(int(marks.last_job.0))
         .bind(marks.unfilled)
         .bind(marks.night.map(|night| int(night.0)))
         .execute(&mut **transaction)
         .await?;
+    sqlx::query("DELETE FROM daemons").execute(&mut **transaction).await?;
+    begin_marks(transaction, &life.daemon).await?;
     sqlx::query("DELETE FROM subscribers").execute(&mut **transaction).await?;
     sqlx::query("DELETE FROM away").execute(&mut **transaction).await?;
     for (name, heard) in &marks.subscribers {
-        let sql = "INSERT INTO subscribers (name, heard) VALUES ($1, $2)";
-        sqlx::query(sql).bind(name).bind(int(heard.0)).execute(&mut **transaction).await?;
+        let sql = "INSERT INTO subscribers (daemon, name, heard) VALUES ($1, $2, $3)";
+        sqlx::query(sql).bind(&life.daemon).bind(name).bind(int(heard.0)).execute(&mut **transaction).await?;
     }
     for (folder, since) in &marks.away {
         let sql = "INSERT INTO away (folder, since) VALUES ($1, $2)";
@@ -110,14 +116,18 @@ async fn put_marks(transaction: &mut PgTransaction<'_>, marks: &Marks) -> Result
     Ok(())
 }
 
-async fn put_notices(transaction: &mut PgTransaction<'_>, notices: &[Notice]) -> Result<(), Failure> {
+async fn put_notices(transaction: &mut PgTransaction<'_>, life: &Life, notices: &[Notice]) -> Result<(), Failure> {
     for notice in notices {
-        let (job, record) = match notice {
-            Notice::End(job) => (Some(job.id), record::encode_end(&outbox::key(Some(job.id)), job)?),
-            Notice::Word(word) => (None, record::encode_word(&outbox::key(None), word)?),
+        let job = match notice {
+            Notice::Word(word) => {
+                outbox::put(transaction, &life.daemon, word).await?;
+                continue;
+            }
+            Notice::End(job) => job,
         };
-        let sql = "INSERT INTO outbox (seq, job, record) VALUES ($1, $2, $3)";
-        let put = sqlx::query(sql).bind(int(notice.seq().0)).bind(job.map(|job| int(job.0))).bind(record);
+        let record = record::encode_end(&outbox::key(Some(job.id)), job)?;
+        let sql = "INSERT INTO outbox (seq, job, folder, record) VALUES ($1, $2, $3, $4)";
+        let put = sqlx::query(sql).bind(int(notice.seq().0)).bind(int(job.id.0)).bind(&job.source.folder).bind(record);
         put.execute(&mut **transaction).await?;
     }
     Ok(())

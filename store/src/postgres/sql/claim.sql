@@ -1,51 +1,31 @@
--- $1 epoch, $2 boot, $3 call, $4 lease in ms, $5 least size, $6 most size, $7 alone, $8 folders that are shut.
+-- $1 epoch, $2 boot, $3 call, $4 lease in ms, $5 least size, $6 most size, $7 alone, $8 folders that are shut, $9 folders that are served.
 -- Connections are told to prefer indexes (`open.rs`): in a new database nothing is known of how many rows there are.
--- Each step of priority takes 1,800,000 ms of waiting; a pause that ends later than 1,800,000 ms from now was set by a clock that jumped.
+-- Each step of priority takes 1,800,000 ms of waiting.
 WITH t AS MATERIALIZED (
     SELECT suture_now() AS now
 ), ready AS MATERIALIZED (
     -- Of each priority those that have risen the most, the oldest first.
-    SELECT r.id, r.kind, p.priority + k.steps AS rank, 0::bigint AS turn
+    SELECT r.id, r.kind, o.base + k.steps AS rank, 0::bigint AS turn
     FROM t
-    CROSS JOIN (SELECT g::smallint AS priority FROM generate_series(0, 9) g) p
-    CROSS JOIN LATERAL (
-        SELECT since FROM jobs
-        WHERE kind IN ('queued', 'queued_alone') AND alone = $7 AND priority = p.priority
-            AND size BETWEEN $5 AND $6 AND folder <> ALL ($8)
-        ORDER BY since LIMIT 1
-    ) o
-    CROSS JOIN LATERAL (SELECT least(9 - p.priority, greatest(0, t.now - o.since) / 1800000) AS steps) k
+    CROSS JOIN suture_oldest($7, $5, $6, $8, $9) o
+    CROSS JOIN LATERAL (SELECT least(9 - o.base, greatest(0, t.now - o.waits_since) / 1800000) AS steps) k
     CROSS JOIN LATERAL (
         SELECT id, kind FROM jobs
-        WHERE kind IN ('queued', 'queued_alone') AND alone = $7 AND priority = p.priority
-            AND size BETWEEN $5 AND $6 AND folder <> ALL ($8)
+        WHERE kind IN ('queued', 'queued_alone') AND alone = $7 AND priority = o.base
+            AND size BETWEEN $5 AND $6 AND folder <> ALL ($8) AND ($9::text[] IS NULL OR folder = ANY ($9))
             AND (k.steps = 0 OR since <= t.now - k.steps * 1800000)
         ORDER BY id LIMIT 64
     ) r
 ), rested AS MATERIALIZED (
-    SELECT r.id, r.kind, r.priority + least(9 - r.priority, greatest(0, t.now - r.since) / 1800000) AS rank, 0::bigint AS turn
-    FROM t CROSS JOIN LATERAL (
-        SELECT id, kind, priority, since FROM jobs
-        WHERE kind = 'waiting' AND not_before IS NOT NULL AND not_before <= t.now
-            AND alone = $7 AND size BETWEEN $5 AND $6 AND folder <> ALL ($8)
-        UNION ALL
-        SELECT id, kind, priority, since FROM jobs
-        WHERE kind = 'waiting' AND not_before IS NOT NULL AND not_before > t.now + 1800000
-            AND alone = $7 AND size BETWEEN $5 AND $6 AND folder <> ALL ($8)
-    ) r
-    ORDER BY rank DESC, r.id LIMIT 64
+    SELECT r.job AS id, 'waiting' AS kind, r.base + least(9 - r.base, greatest(0, t.now - r.waits_since) / 1800000) AS rank, 0::bigint AS turn
+    FROM t CROSS JOIN LATERAL suture_rested(t.now, 'waiting', $8, $9) r
+    WHERE r.is_alone = $7 AND r.file_size BETWEEN $5 AND $6
+    ORDER BY rank DESC, id LIMIT 64
 ), parked AS MATERIALIZED (
     -- Before all others, for whoever asks.
-    SELECT r.id, r.kind, 10::bigint AS rank, r.not_before AS turn
-    FROM t CROSS JOIN LATERAL (
-        (SELECT id, kind, not_before FROM jobs
-        WHERE kind = 'parked' AND not_before IS NOT NULL AND not_before <= t.now AND folder <> ALL ($8)
-        ORDER BY not_before, id LIMIT 64)
-        UNION ALL
-        (SELECT id, kind, not_before FROM jobs
-        WHERE kind = 'parked' AND not_before IS NOT NULL AND not_before > t.now + 1800000 AND folder <> ALL ($8)
-        ORDER BY not_before, id LIMIT 64)
-    ) r
+    SELECT r.job AS id, 'parked' AS kind, 10::bigint AS rank, r.ended AS turn
+    FROM t CROSS JOIN LATERAL suture_rested(t.now, 'parked', $8, $9) r
+    LIMIT 128
 ), candidates AS MATERIALIZED (
     SELECT * FROM ready UNION ALL SELECT * FROM rested UNION ALL SELECT * FROM parked
 ), pick AS MATERIALIZED (

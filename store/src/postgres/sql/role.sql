@@ -2,6 +2,7 @@
 GRANT USAGE ON SCHEMA :schema TO :role;
 GRANT SELECT ON :schema.migrations TO :role;
 GRANT SELECT, UPDATE ON :schema.head TO :role;
-GRANT SELECT, INSERT, UPDATE, DELETE ON :schema.jobs, :schema.lives, :schema.subscribers, :schema.outbox, :schema.away TO :role;
+GRANT SELECT, INSERT, UPDATE, DELETE ON :schema.jobs, :schema.lives, :schema.daemons, :schema.subscribers, :schema.outbox, :schema.away TO :role;
 GRANT SELECT, USAGE, UPDATE ON SEQUENCE :schema.transitions TO :role;
-GRANT EXECUTE ON FUNCTION :schema.suture_now, :schema.suture_up_since, :schema.suture_write TO :role;
+GRANT EXECUTE ON FUNCTION :schema.suture_now, :schema.suture_up_since, :schema.suture_write, :schema.suture_news, :schema.suture_oldest,
+    :schema.suture_rested TO :role;

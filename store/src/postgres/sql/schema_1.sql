@@ -7,7 +7,7 @@ CREATE FUNCTION suture_now() RETURNS bigint LANGUAGE sql VOLATILE
 -- Numbers of transitions; a claim's token is the number of its transition.
 CREATE SEQUENCE transitions;
 
--- What there is one of. Its row orders submissions, so that job numbers have no gaps.
+-- What there is one of. Its row orders submissions, so that job numbers have no gaps. `unfilled` and `night` are what a new daemon begins with.
 CREATE TABLE head (
     one boolean PRIMARY KEY DEFAULT true CHECK (one),
     last_job bigint NOT NULL,
@@ -20,8 +20,19 @@ INSERT INTO head (last_job, unfilled) VALUES (0, true);
 CREATE TABLE lives (
     epoch bigint GENERATED ALWAYS AS IDENTITY PRIMARY KEY,
     daemon text NOT NULL,
+    -- The hot folders that it serves, by name; none: all there are.
+    folders text[],
     began bigint NOT NULL,
+    -- Its last sign of life.
+    seen bigint NOT NULL,
     is_over boolean NOT NULL DEFAULT false
+);
+
+-- What each daemon knows of itself: whether it has yet to read what earlier stores left in its folders, and the end of the last night it told of.
+CREATE TABLE daemons (
+    daemon text PRIMARY KEY,
+    unfilled boolean NOT NULL,
+    night bigint
 );
 
 CREATE TABLE jobs (
@@ -68,16 +79,21 @@ CREATE INDEX jobs_held ON jobs (lease_until) WHERE epoch IS NOT NULL;
 CREATE INDEX jobs_holder ON jobs (epoch) WHERE epoch IS NOT NULL;
 CREATE INDEX jobs_results ON jobs (size, recipe, id) WHERE recipe IS NOT NULL;
 
--- Who is to hear of ends and news, and the last transition that each has heard of.
+-- Whom each daemon tells of ends and news, and the last transition that each of these has heard of.
 CREATE TABLE subscribers (
-    name text PRIMARY KEY,
-    heard bigint NOT NULL
+    daemon text NOT NULL,
+    name text NOT NULL,
+    heard bigint NOT NULL,
+    PRIMARY KEY (daemon, name)
 );
 
 CREATE TABLE outbox (
     seq bigint PRIMARY KEY,
     -- The job that ended; none: news of the service.
     job bigint,
+    -- The hot folder that it is about, or the daemon; where neither is known, everyone tells of it.
+    folder text,
+    daemon text,
     record bytea NOT NULL
 );
 
@@ -91,6 +107,37 @@ CREATE TABLE away (
 CREATE FUNCTION suture_up_since() RETURNS bigint LANGUAGE sql STABLE
     AS $$ SELECT (extract(epoch FROM pg_postmaster_start_time()) * 1000)::bigint $$;
 
+-- Wakes daemons that have nothing to do, once this transaction is durable.
+CREATE FUNCTION suture_news() RETURNS void LANGUAGE sql VOLATILE AS $$ SELECT pg_notify(current_schema() || '_news', '') $$;
+
+-- What may be claimed, for claims and for questions of what waits, of folders that are not `shut` and are `served` (none: all there are). Each is
+-- one query that the planner puts into the statement that asks. First the oldest of each priority, since when it waits.
+CREATE FUNCTION suture_oldest(is_alone boolean, least_size bigint, most_size bigint, shut text[], served text[])
+RETURNS TABLE (base smallint, waits_since bigint) LANGUAGE sql STABLE AS $$
+    SELECT p.base, o.since
+    FROM (SELECT g::smallint AS base FROM generate_series(0, 9) g) p
+    CROSS JOIN LATERAL (
+        SELECT j.since FROM jobs j
+        WHERE j.kind IN ('queued', 'queued_alone') AND j.alone = is_alone AND j.priority = p.base
+            AND j.size BETWEEN least_size AND most_size AND j.folder <> ALL (shut) AND (served IS NULL OR j.folder = ANY (served))
+        ORDER BY j.since LIMIT 1
+    ) o
+$$;
+
+-- Jobs whose pause is over, as their kind is. A pause that ends later than 1,800,000 ms from now was set by a clock that jumped.
+CREATE FUNCTION suture_rested(at bigint, of_kind text, shut text[], served text[])
+RETURNS TABLE (job bigint, base smallint, waits_since bigint, ended bigint, file_size bigint, is_alone boolean) LANGUAGE sql STABLE AS $$
+    (SELECT j.id, j.priority, j.since, j.not_before, j.size, j.alone FROM jobs j
+    WHERE j.kind = of_kind AND j.not_before IS NOT NULL AND j.not_before <= at
+        AND j.folder <> ALL (shut) AND (served IS NULL OR j.folder = ANY (served))
+    ORDER BY j.not_before, j.id)
+    UNION ALL
+    (SELECT j.id, j.priority, j.since, j.not_before, j.size, j.alone FROM jobs j
+    WHERE j.kind = of_kind AND j.not_before IS NOT NULL AND j.not_before > at + 1800000
+        AND j.folder <> ALL (shut) AND (served IS NULL OR j.folder = ANY (served))
+    ORDER BY j.not_before, j.id)
+$$;
+
 -- Compare and set, all in one call; the number of the new transition, or none. `seq_read` is the transition that was read, `needed` the
 -- token that is needed, if one is, `lease` in ms; none: it stays as it is. `ended`: the entry for subscribers of a job that ends by this.
 CREATE FUNCTION suture_write(
@@ -100,6 +147,7 @@ CREATE FUNCTION suture_write(
 ) RETURNS bigint LANGUAGE plpgsql AS $$
 DECLARE
     number bigint;
+    about text;
 BEGIN
     -- Numbers appear in the outbox in another order than they are given; see `outbox.rs`.
     IF ended IS NOT NULL THEN
@@ -112,9 +160,13 @@ BEGIN
         fresh_key = CASE WHEN is_fresh THEN fresh_key END,
         claim_token = NULL, claim_boot = NULL, claim_at = NULL, claim_call = NULL
     WHERE id = job_id AND seq = seq_read AND (needed IS NULL OR token = needed)
-    RETURNING seq INTO number;
+    RETURNING seq, folder INTO number, about;
     IF number IS NOT NULL AND ended IS NOT NULL THEN
-        INSERT INTO outbox (seq, job, record) SELECT number, job_id, ended WHERE EXISTS (SELECT 1 FROM subscribers);
+        INSERT INTO outbox (seq, job, folder, record) SELECT number, job_id, about, ended WHERE EXISTS (SELECT 1 FROM subscribers);
+    END IF;
+    -- Whoever has no claim may have made work for another daemon. Steps of holders wake no one: each would wait for all others at its end.
+    IF number IS NOT NULL AND needed IS NULL AND new_kind_claimed IS NOT NULL THEN
+        PERFORM suture_news();
     END IF;
     RETURN number;
 END $$;

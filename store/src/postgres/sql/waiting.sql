@@ -1,26 +1,11 @@
--- $1 least size, $2 most size, $3 alone, $4 folders that are shut. See claim.sql.
+-- $1 least size, $2 most size, $3 alone, $4 folders that are shut, $5 folders that are served. See claim.sql.
 WITH t AS MATERIALIZED (
     SELECT suture_now() AS now
-), best AS (
-    SELECT p.priority::bigint AS base, p.priority + least(9 - p.priority, greatest(0, t.now - o.since) / 1800000) AS aged
-    FROM t
-    CROSS JOIN (SELECT g::smallint AS priority FROM generate_series(0, 9) g) p
-    CROSS JOIN LATERAL (
-        SELECT since FROM jobs
-        WHERE kind IN ('queued', 'queued_alone') AND alone = $3 AND priority = p.priority
-            AND size BETWEEN $1 AND $2 AND folder <> ALL ($4)
-        ORDER BY since LIMIT 1
-    ) o
+), waits AS (
+    SELECT base, waits_since FROM suture_oldest($3, $1, $2, $4, $5)
     UNION ALL
-    SELECT r.priority, r.priority + least(9 - r.priority, greatest(0, t.now - r.since) / 1800000)
-    FROM t CROSS JOIN LATERAL (
-        SELECT priority, since FROM jobs
-        WHERE kind = 'waiting' AND not_before IS NOT NULL AND not_before <= t.now
-            AND alone = $3 AND size BETWEEN $1 AND $2 AND folder <> ALL ($4)
-        UNION ALL
-        SELECT priority, since FROM jobs
-        WHERE kind = 'waiting' AND not_before IS NOT NULL AND not_before > t.now + 1800000
-            AND alone = $3 AND size BETWEEN $1 AND $2 AND folder <> ALL ($4)
-    ) r
+    SELECT r.base, r.waits_since FROM t CROSS JOIN LATERAL suture_rested(t.now, 'waiting', $4, $5) r
+    WHERE r.is_alone = $3 AND r.file_size BETWEEN $1 AND $2
 )
-SELECT max(base)::bigint AS highest, max(aged)::bigint AS aged FROM best
+SELECT max(base)::bigint AS highest, max(base + least(9 - base, greatest(0, t.now - waits_since) / 1800000))::bigint AS aged
+FROM t CROSS JOIN waits

@@ -78,7 +78,7 @@ fn patience_ends_and_the_store_does_not() {
     server.kill();
     for result in [store.claim(&Filter::default()).map(drop), store.submit(&files(2)).map(drop), store.counts().map(drop)] {
         let error = result.unwrap_err();
-        assert!(matches!(error, StoreError::Backend(_)) && error.exit_code() == 75, "{error:?}");
+        assert!(matches!(error, StoreError::Away { .. }) && error.exit_code() == 75, "{error:?}");
     }
     server.run();
     let claim = store.claim(&Filter::default()).unwrap().unwrap();

@@ -5,7 +5,7 @@ use super::*;
 use crate::memory::MemoryStore;
 use crate::sled_store::SledStore;
 use crate::store::Query;
-use crate::transfer::{Transfer, TransferError, differences, export, import, read};
+use crate::transfer::{SharedStore, Transfer, TransferError, differences, export, import, read};
 
 /// One that has ended and is to be told of, one that runs, one whose result is on its way, one that waits; and marks of all kinds.
 fn fill(store: &dyn JobStore) {

@@ -1,0 +1,30 @@
+//! What is said where the program was built without the feature `postgres`.
+
+use std::sync::Arc;
+
+use suture_store::transfer::SharedStore;
+use suture_store::{Address, JobStore, StoreError};
+
+fn absent(address: &str) -> StoreError {
+    StoreError::Unusable {
+        path: address.into(),
+        reason: "this program was built without PostgreSQL".into(),
+        advice: "take one that was built with the feature `postgres`".into(),
+    }
+}
+
+pub(super) fn connect(address: &Address, _: &str, _: Vec<String>) -> Result<Arc<dyn JobStore>, StoreError> {
+    Err(absent(&address.to_string()))
+}
+
+pub(crate) fn visit(address: &Address, _: &str) -> Result<Box<dyn SharedStore>, StoreError> {
+    Err(absent(&address.to_string()))
+}
+
+pub(crate) fn make(address: &Address) -> Result<(), StoreError> {
+    Err(absent(&address.to_string()))
+}
+
+pub(crate) fn role(_: &str) -> Result<String, StoreError> {
+    Err(absent("the role"))
+}

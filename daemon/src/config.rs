@@ -83,7 +83,7 @@ impl TimeLimit {
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Config {
     pub folders: Vec<FolderConfig>,
-    /// What is this machine's own: the job store, unless `store` names another one.
+    /// The folder of this machine's own state: the job store, unless `store` names another one.
     pub state: PathBuf,
     /// The database that holds the jobs, and that other daemons share.
     pub store: Option<Address>,

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, PoisonError};
 
 use serde::{Deserialize, Serialize};
-use suture_store::{Job, JobId, Kind, Look, Query, StoreError, Time};
+use suture_store::{Job, JobId, JobStore, Kind, Look, Query, StoreError, Time};
 
 use crate::attempt::Context;
 use crate::course::show_whole;
@@ -201,8 +201,8 @@ pub(crate) fn standing(context: &Context) -> Result<Standing, StoreError> {
 }
 
 /// That the job database does not answer, and since when, in words.
-pub(crate) fn away(context: &Context) -> Option<String> {
-    context.store.away().map(|since| format!("the job database has not answered since {}", show_when(since.0)))
+pub(crate) fn away(store: &dyn JobStore) -> Option<String> {
+    store.away().map(|since| format!("the job database has not answered since {}", show_when(since.0)))
 }
 
 /// Why the daemon is not ready for files, in words.
@@ -210,7 +210,7 @@ pub(crate) fn unready(context: &Context) -> Option<String> {
     if context.pulse.is_ending() {
         return Some("the daemon ends".into());
     }
-    if let Some(why) = away(context) {
+    if let Some(why) = away(&*context.store) {
         return Some(why);
     }
     if context.has_failed() || context.store.check().is_err() {

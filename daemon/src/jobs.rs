@@ -84,7 +84,7 @@ pub(crate) fn run(args: &JobsArgs) -> Exit {
     print(text.as_bytes(), Exit::Good)
 }
 
-/// What keeps a daemon from work, in lines.
+/// The troubles that keep a daemon from work, in lines.
 fn trouble(dir: &Path) -> String {
     let Standing { held, away, full, untold, .. } = standing(dir);
     let mut text: String = held.iter().map(|why| format!("nothing new is taken: {why}\n")).collect();

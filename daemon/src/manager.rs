@@ -120,7 +120,7 @@ struct Told {
 /// What the daemon does, in one line.
 fn status(context: &Context) -> String {
     let counts = brief(|| context.store.counts());
-    if let Some(why) = away(context) {
+    if let Some(why) = away(&*context.store) {
         return why;
     }
     let counts = counts.unwrap_or_default();

@@ -17,7 +17,7 @@ use crate::{create, fsx};
 /// The store of a daemon that runs.
 pub(crate) struct Opened {
     pub store: Arc<dyn JobStore>,
-    /// What the opening met.
+    /// The events of the opening.
     pub opening: Opening,
     /// One daemon has the state folder, wherever the jobs are.
     _lock: Option<StateLock>,
@@ -65,7 +65,7 @@ pub(crate) fn has_jobs(state: &Path) -> bool {
     fsx::exists(&state.join("db")).unwrap_or(true)
 }
 
-/// What a daemon is called in a shared store: one at a time has this state folder on this machine.
+/// The name of a daemon in a shared store: one at a time has this state folder on this machine.
 pub(crate) fn daemon_name(state: &Path) -> String {
     let host = std::fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default();
     let state = std::path::absolute(real(state)).unwrap_or_else(|_| state.to_owned());
@@ -124,7 +124,7 @@ pub(crate) fn make(address: &Address) -> Result<(), StoreError> {
     PostgresStore::make(&Shared { patience: VISIT, ..Shared::new(address.exposed(), "") })
 }
 
-/// What lets the role of that name use the store, in SQL.
+/// The SQL that lets the role of that name use the store.
 #[cfg(feature = "postgres")]
 pub(crate) fn role(name: &str) -> Result<String, StoreError> {
     Ok(suture_store::role(&suture_store::Shared::new("", "").schema, name))

@@ -70,7 +70,7 @@ fn verify_shared(address: &Address) -> Result<Exit, Failure> {
     Ok(print(said(&address.to_string(), &found).as_bytes(), exit))
 }
 
-/// What the store holds otherwise than an export says.
+/// The differences of the store from an export.
 fn compared(dir: &Path, address: Option<&Address>, file: &Path, exit: Exit) -> Result<Exit, Failure> {
     let lines = moved::differences(dir, address, file)?;
     let mut text = match lines.len() {

@@ -24,6 +24,7 @@ use crate::event_store::Heard;
 use crate::exit::Exit;
 use crate::folder::{Folder, FolderError, is_fading, must_answer};
 use crate::fsx;
+use crate::glance::away;
 use crate::ground::read_traces;
 use crate::keeper::Keeper;
 use crate::manager::Manager;
@@ -37,7 +38,6 @@ use crate::schedule::{Hold, Schedule, Turn};
 use crate::settings::Settings;
 use crate::shared::{self, Opened};
 use crate::signals::{Hangup, Stop};
-use crate::units::show_when;
 use crate::web::Web;
 use crate::window::RunWindow;
 use crate::world::{Machine, World};
@@ -237,9 +237,8 @@ impl Daemon {
         let state = real(&self.settings.now().state);
         let folder = self.folders.iter().find(|folder| state.starts_with(real(&folder.root)));
         let store = &self.opened.store;
-        let away = || store.away().map(|since| format!("the job database has not answered since {}", show_when(since.0)));
         let full = || (fsx::free_space(&state, 0) < ROOM).then(|| format!("the disk of {} is full", state.display()));
-        let why = || folder.and_then(|folder| folder.missing()).or_else(away).or_else(full);
+        let why = || folder.and_then(|folder| folder.missing()).or_else(|| away(&**store)).or_else(full);
         let mut told = false;
         while let Some(reason) = why().filter(|_| !self.once && !self.stop.asked()) {
             if !std::mem::replace(&mut told, true) {

@@ -124,15 +124,20 @@ fn f01_killed_at_every_step() {
     on_two_threads(&steps, |&step| {
         let hot = Hot::new(with_crash_points());
         drop_two(&hot);
-        let what = format!("killed at pass {step} of {passes}");
-        let killed = was_killed(hot.once(Some(step)));
-        // The order of two jobs is not the same in every run; the last passes may not be reached.
-        assert!(killed || step + 8 > passes, "{what}: was not");
-        assert!(hot.once(None).code().is_some_and(|code| code < 2), "{what}: the next run fails");
-        assert_eq!(state(&hot), expected, "{what}");
-        assert_at_rest(&hot, &what);
-        assert_attempts(&hot, 1, &what);
+        killed_at(&hot, (step, passes), &expected);
     });
+}
+
+/// Kills the daemon at a pass of so many, and lets the next one finish.
+fn killed_at(hot: &Hot, (step, passes): (u64, u64), expected: &BTreeMap<&'static str, Tree>) {
+    let what = format!("killed at pass {step} of {passes}");
+    let killed = was_killed(hot.once(Some(step)));
+    // The order of two jobs is not the same in every run; the last passes may not be reached.
+    assert!(killed || step + 8 > passes, "{what}: was not");
+    assert!(hot.once(None).code().is_some_and(|code| code < 2), "{what}: the next run fails");
+    assert_eq!(state(hot), *expected, "{what}");
+    assert_at_rest(hot, &what);
+    assert_attempts(hot, 1, &what);
 }
 
 /// A folder in which one result is in place, and a file of the same content has been dropped.
@@ -175,19 +180,24 @@ fn f01_killed_at_pairs_of_steps() {
         .flat_map(|first| (1..=passes).map(move |second| (first, second)))
         .filter(|(first, second)| exhaustive() || (first * 5 + second * 3) % 11 == 0)
         .collect();
-    on_two_threads(&pairs, |&(first, second)| {
+    on_two_threads(&pairs, |&pair| {
         let hot = Hot::new(with_crash_points());
         drop_one(&hot);
-        let what = format!("killed at pass {first}, then at pass {second}");
-        for step in [first, second] {
-            // A run that has less to do than that many passes ends by itself.
-            hot.once(Some(step));
-        }
-        assert_eq!(hot.once(None).code(), Some(0), "{what}: the last run fails");
-        assert_eq!(state(&hot), expected, "{what}");
-        assert_at_rest(&hot, &what);
-        assert_attempts(&hot, 2, &what);
+        killed_twice_at(&hot, pair, &expected);
     });
+}
+
+/// Kills the daemon at a pass, the next one at another, and lets the third finish.
+fn killed_twice_at(hot: &Hot, (first, second): (u64, u64), expected: &BTreeMap<&'static str, Tree>) {
+    let what = format!("killed at pass {first}, then at pass {second}");
+    for step in [first, second] {
+        // A run that has less to do than that many passes ends by itself.
+        hot.once(Some(step));
+    }
+    assert_eq!(hot.once(None).code(), Some(0), "{what}: the last run fails");
+    assert_eq!(state(hot), *expected, "{what}");
+    assert_at_rest(hot, &what);
+    assert_attempts(hot, 2, &what);
 }
 
 /// A small generator of numbers (xorshift), so that a failing run can be repeated from its seed.

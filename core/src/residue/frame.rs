@@ -1,6 +1,7 @@
 //! The axes of a path beside those of a mesh: programs write meshes with another axis up, or with axes exchanged.
 
 use std::fmt;
+use std::ops::Neg;
 
 use super::found::Fit;
 use super::options::Region;
@@ -22,9 +23,6 @@ pub struct Frame {
 }
 
 impl Frame {
-    /// That of the mesh.
-    pub const SAME: Self = Self { axes: [0, 1, 2], is_turned: [false; 3] };
-
     /// All 48 of them, that of the mesh first.
     pub fn all() -> impl Iterator<Item = Self> {
         let orders = [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]];
@@ -33,7 +31,7 @@ impl Frame {
 
     /// A point of the mesh in the axes of the path.
     #[must_use]
-    pub fn into_path(self, point: [f32; 3]) -> [f32; 3] {
+    pub fn into_path<T: Copy + Neg<Output = T>>(self, point: [T; 3]) -> [T; 3] {
         [0, 1, 2].map(|axis: usize| {
             let x = point[self.axes[axis]];
             if self.is_turned[axis] { -x } else { x }
@@ -53,10 +51,7 @@ impl Frame {
     /// A box of the mesh in the axes of the path.
     #[must_use]
     pub fn of_box(self, corners: Region) -> Region {
-        let turned = corners.map(|corner| {
-            [0, 1, 2].map(|axis: usize| if self.is_turned[axis] { -corner[self.axes[axis]] } else { corner[self.axes[axis]] })
-        });
-        let [a, b] = turned;
+        let [a, b] = corners.map(|corner| self.into_path(corner));
         [[0, 1, 2].map(|axis: usize| a[axis].min(b[axis])), [0, 1, 2].map(|axis: usize| a[axis].max(b[axis]))]
     }
 

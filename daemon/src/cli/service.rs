@@ -14,7 +14,7 @@ pub(crate) struct StatusArgs {
     /// The hot folder
     #[arg(long, value_name = "DIR", default_value = ".")]
     pub dir: PathBuf,
-    /// What this shared store says, of whatever folder and machine, without asking a daemon
+    /// Ask this shared store, of whatever folder and machine, instead of a daemon
     #[arg(long, value_name = "URL", value_parser = Address::parse)]
     pub store: Option<Address>,
     /// Print JSON

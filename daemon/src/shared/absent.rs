@@ -1,4 +1,4 @@
-//! What is said where the program was built without the feature `postgres`.
+//! The answers of a program that was built without the feature `postgres`.
 
 use std::sync::Arc;
 

@@ -19,7 +19,8 @@ pub(crate) struct Cost {
     pub(crate) wall_seconds: f64,
     /// User and system time of the process and of the children it waited for.
     pub(crate) cpu_seconds: f64,
-    /// Largest resident set of any of its processes, mapped file pages included.
+    /// Largest resident set of any of its processes, mapped file pages included. Where the system's account is no larger than what this process had itself
+    /// when it started the other one, which that account begins with, it is the largest that was looked at every few milliseconds.
     pub(crate) peak_resident_bytes: u64,
     /// Largest anonymous memory of all its processes together, looked at every few milliseconds.
     #[serde(default)]
@@ -76,6 +77,8 @@ pub(super) fn run(mut command: Command, output: Option<&Path>, sync: bool, limit
     let (words, complaints) = (scratch()?, scratch()?);
     let share = |file: &File| file.try_clone().map_err(Error::io("sharing a temporary file"));
     command.stdin(Stdio::null()).stdout(share(&words)?).stderr(share(&complaints)?);
+    // A new process shares the memory of the one that starts it until it has its own program, and its account begins with that.
+    let own_peak = peak_resident_bytes_of_self();
     let begin = Instant::now();
     let child = command.spawn().map_err(Error::io(format!("starting {name}")))?;
     let waited = wait(child.id(), limit).map_err(Error::io(format!("waiting for {name}")))?;
@@ -95,7 +98,11 @@ pub(super) fn run(mut command: Command, output: Option<&Path>, sync: bool, limit
     let cost = Cost {
         wall_seconds,
         cpu_seconds: seconds(usage.ru_utime) + seconds(usage.ru_stime),
-        peak_resident_bytes: usage.ru_maxrss as u64 * 1024,
+        peak_resident_bytes: match usage.ru_maxrss as u64 * 1024 {
+            // The system counts pages of each processor by themselves, so the two accounts differ a little.
+            told if told > own_peak + own_peak / 16 => told,
+            _ => waited.resident_bytes,
+        },
         peak_anonymous_bytes: Some(waited.anonymous_bytes).filter(|bytes| *bytes > 0),
         end,
         exited: code.is_some(),
@@ -128,6 +135,8 @@ struct Waited {
     /// It had to be killed at the limit.
     late: bool,
     anonymous_bytes: u64,
+    /// Largest resident set of the process itself.
+    resident_bytes: u64,
 }
 
 /// Waits for a child, and looks at its memory meanwhile.
@@ -140,16 +149,17 @@ fn wait(id: u32, limit: Duration) -> std::io::Result<Waited> {
         let handle = &handle;
         let watchdog = scope.spawn(move || {
             let begin = Instant::now();
-            let (mut pause, mut anonymous) = (Duration::from_millis(1), 0);
+            let (mut pause, mut anonymous, mut resident) = (Duration::from_millis(1), 0, 0);
             while let Err(RecvTimeoutError::Timeout) = watch.recv_timeout(pause.min(limit.saturating_sub(begin.elapsed()))) {
                 if begin.elapsed() >= limit {
-                    return (pidfd_send_signal(handle, Signal::KILL).is_ok(), anonymous);
+                    return (pidfd_send_signal(handle, Signal::KILL).is_ok(), anonymous, resident);
                 }
                 anonymous = anonymous.max(anonymous_bytes(id));
+                resident = resident.max(bytes_of(&status_of(id), "VmHWM:"));
                 // Often enough for a short process, and for a long one below a thousandth of a processor.
                 pause = (pause * 5 / 4).min(Duration::from_millis(50));
             }
-            (false, anonymous)
+            (false, anonymous, resident)
         });
         let mut status = 0;
         // SAFETY: rusage is a plain C structure of integers, for which all zeros are valid.
@@ -159,19 +169,33 @@ fn wait(id: u32, limit: Duration) -> std::io::Result<Waited> {
         let waited = unsafe { libc::wait4(id as libc::pid_t, &mut status, 0, &mut usage) };
         let error = std::io::Error::last_os_error();
         drop(done);
-        let (late, anonymous_bytes) = watchdog.join().unwrap_or((false, 0));
-        if waited < 0 { Err(error) } else { Ok(Waited { status, usage, late, anonymous_bytes }) }
+        let (late, anonymous_bytes, resident_bytes) = watchdog.join().unwrap_or((false, 0, 0));
+        if waited < 0 { Err(error) } else { Ok(Waited { status, usage, late, anonymous_bytes, resident_bytes }) }
     })
 }
 
 /// Anonymous memory of a process and of all that it started, now; what cannot be read counts as none.
 fn anonymous_bytes(id: u32) -> u64 {
-    let status = std::fs::read_to_string(format!("/proc/{id}/status")).unwrap_or_default();
-    let line = status.lines().find_map(|line| line.strip_prefix("RssAnon:"));
-    let own = line.and_then(|line| line.split_whitespace().next()).and_then(|number| number.parse::<u64>().ok()).unwrap_or(0);
+    let own = bytes_of(&status_of(id), "RssAnon:");
     let threads = std::fs::read_dir(format!("/proc/{id}/task")).into_iter().flatten().flatten();
     let children = threads.filter_map(|thread| std::fs::read_to_string(thread.path().join("children")).ok());
-    own * 1024 + children.flat_map(|line| numbers(&line)).map(anonymous_bytes).sum::<u64>()
+    own + children.flat_map(|line| numbers(&line)).map(anonymous_bytes).sum::<u64>()
+}
+
+/// The largest resident set that this process had.
+fn peak_resident_bytes_of_self() -> u64 {
+    bytes_of(&status_of(std::process::id()), "VmHWM:")
+}
+
+/// The system's account of a process; empty if there is none.
+fn status_of(id: u32) -> String {
+    std::fs::read_to_string(format!("/proc/{id}/status")).unwrap_or_default()
+}
+
+/// A number of kilobytes in such an account, in bytes; 0 if it is not there.
+fn bytes_of(status: &str, name: &str) -> u64 {
+    let line = status.lines().find_map(|line| line.strip_prefix(name));
+    line.and_then(|line| line.split_whitespace().next()).and_then(|number| number.parse::<u64>().ok()).unwrap_or(0) * 1024
 }
 
 fn numbers(line: &str) -> Vec<u32> {
@@ -232,6 +256,14 @@ mod tests {
         let script = "sh -c 'a=$(head -c 20000000 /dev/zero | tr \"\\0\" x); sleep 0.3; : \"$a\"'; true";
         let cost = measure(shell(script), None, true, LONG).unwrap().cost;
         assert!(cost.peak_anonymous_bytes.unwrap() > 20_000_000, "{cost:?}");
+    }
+
+    #[test]
+    fn memory_of_who_starts_it_is_not_the_childs() {
+        let own = vec![1_u8; 200_000_000];
+        let cost = measure(shell("sleep 0.05"), None, true, LONG).unwrap().cost;
+        assert!(cost.peak_resident_bytes > 100_000 && cost.peak_resident_bytes < 50_000_000, "{cost:?}");
+        assert_eq!(own.iter().map(|x| u64::from(*x)).sum::<u64>(), 200_000_000);
     }
 
     #[test]

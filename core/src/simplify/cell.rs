@@ -2,11 +2,9 @@
 
 use glam::DVec3;
 
-use crate::geometry::boxes::BoxTree;
 use crate::geometry::distance::place;
 use crate::geometry::exact::Point;
-use crate::geometry::sums::Bounds;
-use crate::geometry::tri_tri::{Triangle, do_cross};
+use crate::geometry::tri_tri::Triangle;
 use crate::simplify::guard::Guard;
 use crate::simplify::legal::{self, Marks};
 use crate::simplify::partition;
@@ -50,7 +48,7 @@ pub(super) struct Work {
 }
 
 impl Work {
-    /// O(n). With a guard, each collapse is tested exactly; without one, [`Work::is_crossed`] is to be asked in the end.
+    /// O(n). With a guard, each collapse is tested exactly; without one, the whole is to be looked at in the end.
     pub(super) fn new(
         patch: Patch,
         cell: partition::Cell,
@@ -199,45 +197,5 @@ impl Work {
                 }
             }
         }
-    }
-
-    /// Does a triangle that was changed cross another one, or has a vertex that was moved come upon another one? `vertices`: their numbers in the
-    /// mesh; `was`: the triangles and the points as they were.
-    pub(super) fn is_crossed(&self, vertices: &[u32], was: &Patch) -> bool {
-        let patch = &self.patch;
-        let faces: Vec<(usize, [u32; 3])> = patch.faces().collect();
-        let has_moved = |v: u32| patch.points[v as usize] != was.points[v as usize];
-        let is_changed: Vec<bool> =
-            faces.iter().map(|(f, face)| was.face(*f) != *face || face.iter().any(|v| has_moved(*v))).collect();
-        let changed: Vec<usize> = (0..faces.len()).filter(|i| is_changed[*i]).collect();
-        if changed.is_empty() {
-            return false;
-        }
-        let triangles: Vec<Triangle> =
-            faces.iter().map(|(_, face)| patch.triangle(*face)).chain(self.obstacles.iter().map(|o| o.1)).collect();
-        let number = |i: usize| match faces.get(i) {
-            Some((_, face)) => face.map(|v| vertices[v as usize]),
-            None => self.obstacles[i - faces.len()].0,
-        };
-        // Later rounds change few triangles: the tree is of these alone, and all others look into it.
-        let boxes: Vec<Bounds> = changed.iter().map(|i| Bounds::of(&triangles[*i])).collect();
-        let tree = BoxTree::new(&boxes);
-        (0..triangles.len()).any(|j| {
-            let (other, at) = (number(j), &triangles[j]);
-            let is_changed = is_changed.get(j).copied().unwrap_or(false);
-            let mut found = false;
-            tree.each_meeting(&Bounds::of(at), |i| {
-                let i = changed[i as usize];
-                // Of two changed ones, the second looks.
-                if found || j == i || (is_changed && j > i) {
-                    return;
-                }
-                let is_on =
-                    |v: u32| at.iter().zip(other).any(|(p, w)| *p == patch.points[v as usize] && w != vertices[v as usize]);
-                let own = faces[i].1;
-                found = own.iter().any(|v| (is_changed || has_moved(*v)) && is_on(*v)) || do_cross(&triangles[i], at);
-            });
-            found
-        })
     }
 }

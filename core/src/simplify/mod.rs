@@ -7,6 +7,7 @@
 
 mod cell;
 mod course;
+mod crossed;
 mod guard;
 mod held;
 mod legal;

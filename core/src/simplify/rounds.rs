@@ -5,6 +5,7 @@ use rayon::prelude::*;
 
 use crate::geometry::sums::Bounds;
 use crate::simplify::cell::{Obstacle, Rules, Work};
+use crate::simplify::crossed::Look;
 use crate::simplify::net::Net;
 use crate::simplify::partition::{Partition, Planes};
 use crate::simplify::patch::{FIXED, Patch};
@@ -144,9 +145,9 @@ pub(super) fn round(net: &mut Net, rules: Rules, planes: Planes, goal: Goal) -> 
         .par_iter_mut()
         .enumerate()
         .with_max_len(1)
-        .map(|(c, work)| {
+        .map_init(Look::default, |look, (c, work)| {
             let is_crossed =
-                work.patch.live < parted.faces(c).len() && work.is_crossed(parted.vertices(c), &parted.patch(net, c));
+                work.patch.live < parted.faces(c).len() && look.is_crossed(work, parted.vertices(c), &parted.patch(net, c));
             if is_crossed {
                 let live = work.patch.live;
                 *work = parted.work(net, c, rules, true);

@@ -77,7 +77,7 @@ pub(super) fn run(mut command: Command, output: Option<&Path>, sync: bool, limit
     let (words, complaints) = (scratch()?, scratch()?);
     let share = |file: &File| file.try_clone().map_err(Error::io("sharing a temporary file"));
     command.stdin(Stdio::null()).stdout(share(&words)?).stderr(share(&complaints)?);
-    // A new process shares the memory of the one that starts it until it has its own program, and its account begins with that.
+    // A new process shares the memory of the one that starts it until it runs its own program, and its account begins with that.
     let own_peak = peak_resident_bytes_of_self();
     let begin = Instant::now();
     let child = command.spawn().map_err(Error::io(format!("starting {name}")))?;
@@ -99,11 +99,12 @@ pub(super) fn run(mut command: Command, output: Option<&Path>, sync: bool, limit
         wall_seconds,
         cpu_seconds: seconds(usage.ru_utime) + seconds(usage.ru_stime),
         peak_resident_bytes: match usage.ru_maxrss as u64 * 1024 {
-            // The system counts pages of each processor by themselves, so the two accounts differ a little.
-            told if told > own_peak + own_peak / 16 => told,
-            _ => waited.resident_bytes,
+            // The system counts pages of each processor by themselves, so the two accounts differ a little. Of a process that ended too soon no other
+            // account is known: it had no more than that.
+            told if told > own_peak + own_peak / 16 || waited.looks < LOOKS => told,
+            _ => waited.memory.resident,
         },
-        peak_anonymous_bytes: Some(waited.anonymous_bytes).filter(|bytes| *bytes > 0),
+        peak_anonymous_bytes: Some(waited.memory.anonymous).filter(|bytes| *bytes > 0),
         end,
         exited: code.is_some(),
         code,
@@ -134,9 +135,40 @@ struct Waited {
     usage: libc::rusage,
     /// It had to be killed at the limit.
     late: bool,
-    anonymous_bytes: u64,
-    /// Largest resident set of the process itself.
-    resident_bytes: u64,
+    memory: Memory,
+    /// How often its memory was looked at.
+    looks: u32,
+}
+
+/// After so many looks, 20 milliseconds, a process has run its own program for a while.
+const LOOKS: u32 = 8;
+
+/// Memory of a process and of all that it started, in bytes; what cannot be read counts as none.
+#[derive(Clone, Copy, Debug, Default)]
+struct Memory {
+    /// Anonymous memory of all of them together.
+    anonymous: u64,
+    /// The largest resident set that any of them had.
+    resident: u64,
+}
+
+impl Memory {
+    /// Now.
+    fn of(id: u32) -> Self {
+        let status = status_of(id);
+        let own = Self { anonymous: bytes_of(&status, "RssAnon:"), resident: bytes_of(&status, "VmHWM:") };
+        let threads = std::fs::read_dir(format!("/proc/{id}/task")).into_iter().flatten().flatten();
+        let children = threads.filter_map(|thread| std::fs::read_to_string(thread.path().join("children")).ok());
+        children
+            .flat_map(|line| numbers(&line))
+            .map(Self::of)
+            .fold(own, |all, one| Self { anonymous: all.anonymous + one.anonymous, resident: all.resident.max(one.resident) })
+    }
+
+    /// The more of two looks.
+    fn max(self, other: Self) -> Self {
+        Self { anonymous: self.anonymous.max(other.anonymous), resident: self.resident.max(other.resident) }
+    }
 }
 
 /// Waits for a child, and looks at its memory meanwhile.
@@ -149,17 +181,17 @@ fn wait(id: u32, limit: Duration) -> std::io::Result<Waited> {
         let handle = &handle;
         let watchdog = scope.spawn(move || {
             let begin = Instant::now();
-            let (mut pause, mut anonymous, mut resident) = (Duration::from_millis(1), 0, 0);
+            let (mut pause, mut memory, mut looks) = (Duration::from_millis(1), Memory::default(), 0);
             while let Err(RecvTimeoutError::Timeout) = watch.recv_timeout(pause.min(limit.saturating_sub(begin.elapsed()))) {
                 if begin.elapsed() >= limit {
-                    return (pidfd_send_signal(handle, Signal::KILL).is_ok(), anonymous, resident);
+                    return (pidfd_send_signal(handle, Signal::KILL).is_ok(), memory, looks);
                 }
-                anonymous = anonymous.max(anonymous_bytes(id));
-                resident = resident.max(bytes_of(&status_of(id), "VmHWM:"));
+                memory = memory.max(Memory::of(id));
+                looks += 1;
                 // Often enough for a short process, and for a long one below a thousandth of a processor.
                 pause = (pause * 5 / 4).min(Duration::from_millis(50));
             }
-            (false, anonymous, resident)
+            (false, memory, looks)
         });
         let mut status = 0;
         // SAFETY: rusage is a plain C structure of integers, for which all zeros are valid.
@@ -169,17 +201,9 @@ fn wait(id: u32, limit: Duration) -> std::io::Result<Waited> {
         let waited = unsafe { libc::wait4(id as libc::pid_t, &mut status, 0, &mut usage) };
         let error = std::io::Error::last_os_error();
         drop(done);
-        let (late, anonymous_bytes, resident_bytes) = watchdog.join().unwrap_or((false, 0, 0));
-        if waited < 0 { Err(error) } else { Ok(Waited { status, usage, late, anonymous_bytes, resident_bytes }) }
+        let (late, memory, looks) = watchdog.join().unwrap_or_default();
+        if waited < 0 { Err(error) } else { Ok(Waited { status, usage, late, memory, looks }) }
     })
-}
-
-/// Anonymous memory of a process and of all that it started, now; what cannot be read counts as none.
-fn anonymous_bytes(id: u32) -> u64 {
-    let own = bytes_of(&status_of(id), "RssAnon:");
-    let threads = std::fs::read_dir(format!("/proc/{id}/task")).into_iter().flatten().flatten();
-    let children = threads.filter_map(|thread| std::fs::read_to_string(thread.path().join("children")).ok());
-    own + children.flat_map(|line| numbers(&line)).map(anonymous_bytes).sum::<u64>()
 }
 
 /// The largest resident set that this process had.
@@ -192,8 +216,8 @@ fn status_of(id: u32) -> String {
     std::fs::read_to_string(format!("/proc/{id}/status")).unwrap_or_default()
 }
 
-/// A number of kilobytes in such an account, in bytes; 0 if it is not there.
-fn bytes_of(status: &str, name: &str) -> u64 {
+/// A number of kilobytes in an account of the system, in bytes; 0 if it is not there.
+pub(super) fn bytes_of(status: &str, name: &str) -> u64 {
     let line = status.lines().find_map(|line| line.strip_prefix(name));
     line.and_then(|line| line.split_whitespace().next()).and_then(|number| number.parse::<u64>().ok()).unwrap_or(0) * 1024
 }
@@ -261,7 +285,7 @@ mod tests {
     #[test]
     fn memory_of_who_starts_it_is_not_the_childs() {
         let own = vec![1_u8; 200_000_000];
-        let cost = measure(shell("sleep 0.05"), None, true, LONG).unwrap().cost;
+        let cost = measure(shell("sleep 0.5"), None, true, LONG).unwrap().cost;
         assert!(cost.peak_resident_bytes > 100_000 && cost.peak_resident_bytes < 50_000_000, "{cost:?}");
         assert_eq!(own.iter().map(|x| u64::from(*x)).sum::<u64>(), 200_000_000);
     }

@@ -9,6 +9,7 @@ use std::time::Instant;
 use serde::{Deserialize, Serialize};
 
 use super::cache;
+use super::child;
 use super::folders::home;
 use super::programs::said;
 use super::way::Cache;
@@ -45,8 +46,6 @@ impl Machine {
             let line = text.lines().find(|line| line.starts_with(name));
             line.and_then(|line| line.split_once(':')).map(|(_, value)| value.trim().to_owned())
         };
-        let memory = field(&read("/proc/meminfo"), "MemTotal").unwrap_or_default();
-        let kilobytes: u64 = memory.split_whitespace().next().and_then(|number| number.parse().ok()).unwrap_or(0);
         let mut versions: Vec<_> = said(Command::new("rustc").arg("--version")).into_iter().collect();
         let git = |arguments: &[&str]| said(Command::new("git").arg("-C").arg(home()).args(arguments));
         if let Some(commit) = git(&["rev-parse", "--short", "HEAD"]) {
@@ -57,7 +56,7 @@ impl Machine {
         Self {
             processor: field(&read("/proc/cpuinfo"), "model name").unwrap_or_else(|| "unknown".into()),
             processors: std::thread::available_parallelism().map_or(1, usize::from),
-            memory_bytes: kilobytes * 1024,
+            memory_bytes: child::bytes_of(&read("/proc/meminfo"), "MemTotal:"),
             kernel: format!("Linux {}", read("/proc/sys/kernel/osrelease").trim()),
             file_system: file_system(&read("/proc/mounts"), folder),
             load: read("/proc/loadavg").split_whitespace().next().unwrap_or("unknown").into(),

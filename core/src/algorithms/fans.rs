@@ -120,6 +120,11 @@ fn is_sharp(n: &DVec3, m: &DVec3, feature: f64) -> bool {
     *n != DVec3::ZERO && *m != DVec3::ZERO && n.dot(*m) < feature
 }
 
+/// Do the sides of triangles around a vertex follow each other once around, and all the same way? Puts them in order. O(n²).
+pub(crate) fn is_closed_fan(rings: &mut [[u32; 2]]) -> bool {
+    in_order(rings) == Fan::Closed
+}
+
 /// Puts the sides of a fan of different vertices in order, and tells how they hang together.
 fn in_order(rings: &mut [[u32; 2]]) -> Fan {
     let is_first = |i: &usize| rings.iter().all(|ring| ring[1] != rings[*i][0]);

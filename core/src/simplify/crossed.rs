@@ -1,6 +1,9 @@
 //! Does a cell's surface cross itself where it was changed? The search is the one by which whole meshes are judged: exact, and most stars are certified in
 //! linear time ([`crate::topology::intersect`]).
 
+use std::collections::BTreeMap;
+
+use crate::algorithms::fans::is_closed_fan;
 use crate::geometry::collinear::is_collinear;
 use crate::geometry::exact::Point;
 use crate::simplify::cell::Work;
@@ -19,6 +22,7 @@ pub(super) struct Look {
 }
 
 /// The triangles of a cell and its obstacles, by numbers of their own for the vertices that they have.
+#[derive(Default)]
 struct Scene {
     positions: Vec<Point>,
     triangles: Vec<[u32; 3]>,
@@ -34,42 +38,37 @@ impl Scene {
     fn new(work: &Work, vertices: &[u32], was: &Patch) -> Self {
         let patch = &work.patch;
         let has_moved = |v: u32| patch.points[v as usize] != was.points[v as usize];
-        let (mut triangles, mut is_changed) = (Vec::with_capacity(patch.live), Vec::with_capacity(patch.live));
-        let (mut numbers, mut own) = (vec![NONE; patch.points.len()], Vec::new());
-        let mut number = |v: u32, own: &mut Vec<u32>| {
+        let mut scene = Self::default();
+        let (mut numbers, mut beyond) = (vec![NONE; patch.points.len()], BTreeMap::new());
+        let mut number = |scene: &mut Self, v: u32| {
             let number = &mut numbers[v as usize];
             if *number == NONE {
-                *number = own.len() as u32;
-                own.push(v);
+                *number = scene.add(v, patch.points[v as usize], has_moved(v));
             }
             *number
         };
         for (f, face) in patch.faces() {
-            is_changed.push(was.face(f) != face || face.iter().any(|v| has_moved(*v)));
-            triangles.push(face.map(|v| number(v, &mut own)));
+            scene.is_changed.push(was.face(f) != face || face.iter().any(|v| has_moved(*v)));
+            let face = face.map(|v| number(&mut scene, v));
+            scene.triangles.push(face);
         }
-        let mut beyond: Vec<(u32, Point)> = Vec::new();
         for (face, triangle) in &work.obstacles {
-            beyond.extend(face.iter().copied().zip(*triangle).filter(|(v, _)| vertices.binary_search(v).is_err()));
+            let face = [0, 1, 2].map(|k: usize| match vertices.binary_search(&face[k]) {
+                Ok(v) => number(&mut scene, v as u32),
+                Err(_) => *beyond.entry(face[k]).or_insert_with(|| scene.add(NONE, triangle[k], false)),
+            });
+            scene.is_changed.push(false);
+            scene.triangles.push(face);
         }
-        beyond.sort_unstable_by_key(|(v, _)| *v);
-        beyond.dedup_by_key(|(v, _)| *v);
-        let mut corner = |v: u32| match vertices.binary_search(&v) {
-            Ok(own_vertex) => Ok(number(own_vertex as u32, &mut own)),
-            Err(_) => Err(beyond.partition_point(|(w, _)| *w < v) as u32),
-        };
-        let corners: Vec<_> = work.obstacles.iter().map(|(face, _)| face.map(&mut corner)).collect();
-        let first = own.len() as u32;
-        triangles.extend(corners.into_iter().map(|face| face.map(|v| v.unwrap_or_else(|v| first + v))));
-        is_changed.resize(triangles.len(), false);
-        let moved = own.iter().map(|v| has_moved(*v)).collect();
-        // The search knows no −0.0.
-        let points = own.iter().map(|v| patch.points[*v as usize]).chain(beyond.iter().map(|(_, p)| *p));
-        let positions: Vec<Point> = points.map(|p| p.map(|x| x + 0.0)).collect();
-        let mut scene = Self { positions, triangles, own, has_moved: moved, is_changed };
-        scene.own.resize(scene.positions.len(), NONE);
-        scene.has_moved.resize(scene.positions.len(), false);
         scene
+    }
+
+    /// Adds a vertex, and numbers it.
+    fn add(&mut self, own: u32, position: Point, has_moved: bool) -> u32 {
+        self.own.push(own);
+        self.positions.push(position);
+        self.has_moved.push(has_moved);
+        self.own.len() as u32 - 1
     }
 
     /// Has a vertex come upon another one? `same`: the number of each one's position.
@@ -131,9 +130,8 @@ impl Look {
         }
         let view =
             CellView { positions, triangles: &scene.triangles, left_out: &left_out, standing: &standing, cell: HomeBox::ALL };
-        let effort = Effort { allowance: u64::MAX, askew: false, around: None };
         let mut is_crossed = false;
-        self.finder.pairs(&view, effort, |some, others, contact| {
+        self.finder.pairs(&view, Effort::ALL, |some, others, contact| {
             is_crossed |= contact.is_crossing() && some.iter().chain(others).any(|t| scene.is_changed[*t as usize]);
         });
         is_crossed
@@ -152,20 +150,7 @@ impl Look {
 
 /// Is a vertex of a cell in the middle of one closed fan whose triangles run the same way?
 fn is_regular(patch: &Patch, v: u32, star: &mut Star) -> bool {
-    if patch.kinds[v as usize] > CREASE || !patch.star(v, star) {
-        return false;
-    }
-    let rings = &star.ring[..star.len];
-    let mut at = rings[0][1];
-    for _ in 1..rings.len() {
-        let mut next = rings.iter().filter(|ring| ring[0] == at);
-        let (Some(one), None) = (next.next(), next.next()) else { return false };
-        if one[0] == rings[0][0] {
-            return false;
-        }
-        at = one[1];
-    }
-    rings.len() > 2 && at == rings[0][0]
+    patch.kinds[v as usize] <= CREASE && patch.star(v, star) && is_closed_fan(&mut star.ring[..star.len])
 }
 
 #[cfg(test)]

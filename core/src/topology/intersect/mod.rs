@@ -64,7 +64,6 @@ pub(crate) struct Effort {
 
 impl Effort {
     /// Each pair whose boxes overlap.
-    #[cfg(any(test, feature = "internals"))]
     pub(crate) const ALL: Self = Self { allowance: u64::MAX, askew: false, around: None };
 }
 

@@ -1,6 +1,7 @@
 //! The triangles around each vertex, and whether they form one fan, closed or open.
 
 use glam::DVec3;
+use rayon::prelude::*;
 
 use crate::geometry::distance::place;
 use crate::geometry::exact::Point;
@@ -8,21 +9,46 @@ use crate::geometry::exact::Point;
 /// Vertices of more triangles than this are taken for what is not closed, so that no step costs more than a constant.
 pub(crate) const MOST: usize = 48;
 
-/// The corners at each vertex, 3f + k for corner k of face f, from where to where.
+/// Fewer vertices make no range of their own.
+const LEAST: usize = 1 << 14;
+
+/// The corners at each vertex, 3f + k for corner k of face f, ascending, from where to where. O(n), on the threads of the pool that this one belongs to:
+/// each has a range of vertices.
 pub(crate) fn corners_by_vertex(vertices: usize, faces: &[[u32; 3]]) -> (Vec<u32>, Vec<u32>) {
+    let size = vertices.div_ceil(rayon::current_num_threads()).max(LEAST);
     let mut starts = vec![0_u32; vertices + 1];
-    faces.as_flattened().iter().for_each(|v| starts[*v as usize] += 1);
+    starts[1..].par_chunks_mut(size).enumerate().for_each(|(range, counts)| {
+        let first = range * size;
+        for v in faces.as_flattened() {
+            if let Some(count) = counts.get_mut((*v as usize).wrapping_sub(first)) {
+                *count += 1;
+            }
+        }
+    });
     let mut sum = 0;
     for start in &mut starts {
         sum += *start;
         *start = sum;
     }
     let mut corners = vec![0_u32; 3 * faces.len()];
-    for (corner, v) in faces.as_flattened().iter().enumerate().rev() {
-        let at = &mut starts[*v as usize];
-        *at -= 1;
-        corners[*at as usize] = corner as u32;
+    let mut rest = &mut corners[..];
+    let mut ranges = Vec::new();
+    for first in (0..vertices).step_by(size) {
+        let end = (first + size).min(vertices);
+        let (own, others) = rest.split_at_mut((starts[end] - starts[first]) as usize);
+        ranges.push((first, own));
+        rest = others;
     }
+    ranges.into_par_iter().for_each(|(first, own)| {
+        let before = starts[first];
+        let mut ends: Vec<u32> = starts[first..vertices.min(first + size)].iter().map(|start| start - before).collect();
+        for (corner, v) in faces.as_flattened().iter().enumerate() {
+            if let Some(end) = ends.get_mut((*v as usize).wrapping_sub(first)) {
+                own[*end as usize] = corner as u32;
+                *end += 1;
+            }
+        }
+    });
     (starts, corners)
 }
 
@@ -47,38 +73,45 @@ pub(crate) struct Rim {
     pub(crate) features: usize,
 }
 
-/// The normals of the triangles around a vertex, from one to the next, if they form one fan of triangles with areas.
+/// The normals of the triangles around a vertex, from one to the next, if they form one fan of triangles with areas. It is lent to one vertex after the
+/// other, since it is large.
 pub(crate) struct Around {
     count: usize,
     normals: [DVec3; MOST],
-    neighbours: [u32; MOST],
+    /// The sides beyond the vertex, in order; any order where the fan is not closed.
+    rings: [[u32; 2]; MOST],
     fan: Fan,
     /// The edges of the first triangle and of the last one that have no other.
     ends: [DVec3; 2],
 }
 
+impl Default for Around {
+    fn default() -> Self {
+        Self { count: 0, normals: [DVec3::ZERO; MOST], rings: [[0; 2]; MOST], fan: Fan::Other, ends: [DVec3::ZERO; 2] }
+    }
+}
+
 impl Around {
-    /// None of no triangles, or of too many.
-    pub(crate) fn new(points: &[Point], faces: &[[u32; 3]], corners: &[u32]) -> Option<Self> {
+    /// Looks at the vertex of these corners. None of no triangles, or of too many.
+    pub(crate) fn of(&mut self, points: &[Point], faces: &[[u32; 3]], corners: &[u32]) -> Option<&Self> {
         if corners.is_empty() || corners.len() > MOST {
             return None;
         }
-        let mut rings = [[0_u32; 2]; MOST];
+        self.count = corners.len();
+        let rings = &mut self.rings[..corners.len()];
         for (ring, corner) in rings.iter_mut().zip(corners) {
             let face = faces[*corner as usize / 3];
             let k = *corner as usize % 3;
             *ring = [face[(k + 1) % 3], face[(k + 2) % 3]];
         }
-        let count = corners.len();
-        let fan = in_order(&mut rings[..count]);
+        self.fan = in_order(rings);
         let centre = faces[corners[0] as usize / 3][corners[0] as usize % 3];
         let p = place(points[centre as usize]);
-        let mut normals = [DVec3::ZERO; MOST];
-        for (normal, [a, b]) in normals.iter_mut().zip(rings).take(count) {
-            *normal = (place(points[a as usize]) - p).cross(place(points[b as usize]) - p).normalize_or_zero();
+        for (normal, [a, b]) in self.normals.iter_mut().zip(&*rings) {
+            *normal = (place(points[*a as usize]) - p).cross(place(points[*b as usize]) - p).normalize_or_zero();
         }
-        let ends = [rings[0][0], rings[count - 1][1]].map(|w| place(points[w as usize]) - p);
-        Some(Self { count, normals, neighbours: rings.map(|ring| ring[0]), fan, ends })
+        self.ends = [rings[0][0], rings[rings.len() - 1][1]].map(|w| place(points[w as usize]) - p);
+        Some(self)
     }
 
     /// How many of its edges are features: where the cosine of the angle between normals is below `feature`. None where the fan is not closed.
@@ -112,7 +145,7 @@ impl Around {
 
     /// The vertices around, in order; any order where the fan is not closed.
     pub(crate) fn neighbours(&self) -> impl Iterator<Item = u32> + '_ {
-        self.neighbours.iter().copied().take(self.count)
+        self.rings.iter().map(|ring| ring[0]).take(self.count)
     }
 }
 
@@ -178,7 +211,8 @@ mod tests {
     fn a_rim_that_goes_straight_on_is_told() {
         let points = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]];
         let faces = [[0, 2, 3], [0, 1, 2]];
-        let around = Around::new(&points, &faces, &[0, 3]).unwrap();
+        let mut around = Around::default();
+        let around = around.of(&points, &faces, &[0, 3]).unwrap();
         let rim = around.rim(0.5).unwrap();
         assert_eq!((rim.cosine, rim.features, around.is_closed()), (1.0, 0, false));
         assert!(rim.across.iter().all(|n| *n == DVec3::Y || *n == DVec3::NEG_Y));

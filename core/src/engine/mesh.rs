@@ -2,9 +2,9 @@
 
 use rayon::prelude::*;
 
+use crate::engine::shared_vertices::{self, Welded};
 use crate::io::read::MAX_TRIANGLES;
 use crate::io::record::{self, Record};
-use crate::topology::vertex_table::{BATCH, Weld};
 use crate::util::parallel;
 use crate::util::words::Count;
 
@@ -71,40 +71,22 @@ impl Mesh {
         if triangles.len() as u64 > MAX_TRIANGLES {
             return Err(MeshError::TooManyFaces { faces: triangles.len() });
         }
-        Self::welded(triangles)
+        Self::of_welded(shared_vertices::alone(triangles, |triangle| *triangle))
     }
 
-    fn welded(triangles: &[[[f32; 3]; 3]]) -> Result<Self, MeshError> {
-        let mut weld = Weld::default();
-        weld.reset(triangles.len() / 2);
-        let mut faces = Vec::with_capacity(triangles.len());
-        let mut apart: Vec<(usize, usize, [f32; 3])> = Vec::new();
-        let is_finite = |p: &[f32; 3]| p.iter().all(|x| x.is_finite());
-        for group in triangles.chunks(BATCH / 3) {
-            if group.as_flattened().iter().all(is_finite) {
-                let mut vertices = [0; BATCH];
-                weld.vertices(group.as_flattened(), &mut vertices);
-                faces.extend(vertices.as_chunks().0.iter().take(group.len()));
-                continue;
-            }
-            for corners in group {
-                let face = faces.len();
-                faces.push(std::array::from_fn(|k| {
-                    if is_finite(&corners[k]) {
-                        return weld.vertex(corners[k]);
-                    }
-                    apart.push((face, k, corners[k]));
-                    0
-                }));
-            }
+    /// The same of records, on the threads of the pool that this one belongs to.
+    ///
+    /// # Errors
+    /// As those of [`Self::from_triangles`].
+    pub(crate) fn of_records(records: &[Record]) -> Result<Self, MeshError> {
+        if records.len() as u64 > MAX_TRIANGLES {
+            return Err(MeshError::TooManyFaces { faces: records.len() });
         }
-        let mut vertices = weld.into_positions();
-        let count = vertices.len() + apart.len();
-        u32::try_from(count).map_err(|_| MeshError::TooManyVertices { vertices: count })?;
-        for (face, k, p) in apart {
-            faces[face][k] = vertices.len() as u32;
-            vertices.push(p);
-        }
+        Self::of_welded(shared_vertices::together(records, record::corners))
+    }
+
+    fn of_welded(welded: Result<Welded, usize>) -> Result<Self, MeshError> {
+        let Welded { vertices, faces } = welded.map_err(|vertices| MeshError::TooManyVertices { vertices })?;
         Ok(Self { vertices, faces })
     }
 

@@ -24,6 +24,7 @@ pub mod operations;
 mod package;
 mod parts;
 mod shaping;
+mod shared_vertices;
 mod together;
 mod welding;
 mod work;

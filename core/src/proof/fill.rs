@@ -156,11 +156,15 @@ impl Cut<'_> {
         piece.clear();
         piece.extend((0..=steps).map(|step| rim[(start + step) % n]));
         visit(Piece { face, corners: piece });
-        rim.rotate_left(start);
-        shared.rotate_left(start);
-        rim.drain(1..steps);
-        shared.drain(1..steps);
-        shared[0] = Shared::of(self.surface, [&rim[0].spot, &rim[1 % rim.len()].spot]);
+        // All but the ends of the run go: behind its start, and before its end where it runs beyond the list's.
+        let end = n.min(start + steps);
+        let beyond = start + steps - end;
+        rim.drain(start + 1..end);
+        shared.drain(start + 1..end);
+        rim.drain(..beyond);
+        shared.drain(..beyond);
+        let start = start - beyond;
+        shared[start] = Shared::of(self.surface, [&rim[start].spot, &rim[(start + 1) % rim.len()].spot]);
     }
 
     /// A vertex of the surface as the image of the nearest place of the triangle.

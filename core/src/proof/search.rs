@@ -1,6 +1,10 @@
-//! Bounds of the distance of single triangles from a mesh, by halves.
+//! Bounds of the distance of single triangles from a mesh, by parts of halves.
 //!
 //! The distance from a triangle is a convex function, so that no place of another triangle is farther from it than the farthest corner is.
+
+use std::cmp::Ordering;
+use std::collections::BinaryHeap;
+use std::collections::binary_heap::PeekMut;
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -12,11 +16,38 @@ use crate::geometry::sums::Bounds;
 use crate::proof::pairing::Pairing;
 use crate::proof::surface::{Spot, Surface};
 
-/// How often a triangle is cut into four.
-const DEPTH: usize = 5;
+/// How many parts of a triangle are cut into four, at most.
+const CUTS: usize = 1 << 10;
 
 /// The bound of all triangles is not much better than that of a place of one of them: no search goes on for less.
 const SLACK: f64 = 1.02;
+
+/// A part of a triangle, and the bound of its places.
+struct Part {
+    bound: f64,
+    corners: [DVec3; 3],
+}
+
+/// By their bounds.
+impl Ord for Part {
+    fn cmp(&self, other: &Self) -> Ordering {
+        self.bound.total_cmp(&other.bound)
+    }
+}
+
+impl PartialOrd for Part {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl PartialEq for Part {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other).is_eq()
+    }
+}
+
+impl Eq for Part {}
 
 /// Triangles to be near to.
 struct Field {
@@ -30,16 +61,20 @@ impl Field {
         Self { triangles: triangles.iter().map(|t| t.map(place)).collect(), tree: BoxTree::new(&boxes) }
     }
 
-    /// A bound of the distance of a triangle's places, no better than `aim` if it is below.
-    fn bound(&self, t: &[DVec3; 3], aim: f64, depth: usize) -> f64 {
-        let one = self.of_one(t, aim);
-        if one <= aim || depth == 0 {
-            return one;
+    /// A bound of the distance of a triangle's places, no better than `aim` if it is below, and not much better than the distance of its farthest place.
+    /// The part with the largest bound is cut first, so that what is near is not looked at for long.
+    fn bound(&self, t: &[DVec3; 3], mut aim: f64) -> f64 {
+        let part = |corners: [DVec3; 3]| Part { bound: self.of_one(&corners, aim), corners };
+        let mut parts = BinaryHeap::from([part(*t)]);
+        for _ in 0..CUTS {
+            let Some(Part { bound, corners }) = parts.peek_mut().filter(|part| part.bound > aim).map(PeekMut::pop) else { break };
+            let [a, b, c] = corners;
+            aim = aim.max(SLACK * self.of_one(&[(a + b + c) / 3.0], aim));
+            let [ab, bc, ca] = [0.5 * (a + b), 0.5 * (b + c), 0.5 * (c + a)];
+            let part = |corners: [DVec3; 3]| Part { bound: self.of_one(&corners, aim).min(bound), corners };
+            parts.extend([[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]].map(part));
         }
-        let [a, b, c] = *t;
-        let [ab, bc, ca] = [0.5 * (a + b), 0.5 * (b + c), 0.5 * (c + a)];
-        let parts = [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]];
-        parts.iter().map(|part| self.bound(part, aim, depth - 1)).fold(0.0, f64::max).min(one)
+        parts.peek().map_or(0.0, |part| part.bound)
     }
 
     /// The least of the distances from single triangles: of each, that of the farthest of some places.
@@ -98,7 +133,7 @@ fn bounds(wanted: &[[DVec3; 3]], near: &[[Point; 3]], all: &[[u32; 3]], points: 
     let farthest_place = |i: &usize| wanted[*i].iter().map(|p| field.of_one(&[*p], aim)).fold(0.0, f64::max);
     let farthest = left.par_iter().with_max_len(16).map(farthest_place).reduce(|| 0.0, f64::max);
     let aim = aim.max((farthest * SLACK).min(most));
-    let better: Vec<f64> = left.par_iter().with_max_len(16).map(|i| field.bound(&wanted[*i], aim, DEPTH)).collect();
+    let better: Vec<f64> = left.par_iter().with_max_len(16).map(|i| field.bound(&wanted[*i], aim)).collect();
     left.iter().zip(better).for_each(|(i, better)| bounds[*i] = bounds[*i].min(better));
     bounds
 }

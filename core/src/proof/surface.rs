@@ -3,6 +3,7 @@
 use glam::DVec3;
 use rayon::prelude::*;
 
+use crate::algorithms::fans::corners_by_vertex;
 use crate::geometry::distance::{place, share_along};
 use crate::geometry::exact::Point;
 use crate::util::ids::NONE;
@@ -38,21 +39,8 @@ impl Spot {
 impl<'a> Surface<'a> {
     /// O(n), where one end of each edge has a bounded number of faces.
     pub(super) fn new(points: &'a [Point], faces: &'a [[u32; 3]]) -> Self {
-        let mut starts = vec![0_u32; points.len() + 1];
-        faces.as_flattened().iter().for_each(|v| starts[*v as usize] += 1);
-        let mut sum = 0;
-        for start in &mut starts {
-            sum += *start;
-            *start = sum;
-        }
-        let mut around = vec![0_u32; 3 * faces.len()];
-        for (f, face) in faces.iter().enumerate().rev() {
-            for v in face {
-                let at = &mut starts[*v as usize];
-                *at -= 1;
-                around[*at as usize] = f as u32;
-            }
-        }
+        let (starts, mut around) = corners_by_vertex(points.len(), faces);
+        around.par_iter_mut().with_min_len(1 << 12).for_each(|corner| *corner /= 3);
         let mut surface = Self { points, faces, starts, around, beyond: Vec::new() };
         let of_face = |f: usize| [0, 1, 2].map(|k| surface.look_beyond(f as u32, k));
         surface.beyond = (0..faces.len()).into_par_iter().with_min_len(1 << 10).map(of_face).collect();

@@ -92,6 +92,9 @@ impl Work {
     }
 
     /// The quadric's value by its weight, the cost, and the best place for the vertex that two become. The first one is no freer than the second.
+    ///
+    /// The cost is the value by the root of its weight. By the value itself, flat places, whose vertices stand for many planes, stay fine, and curved ones
+    /// pay for that; by the value by its weight, some places go too far in the end.
     #[inline]
     fn price(&self, [u, v]: [u32; 2]) -> Option<(f64, f64, Point)> {
         let (patch, [i, j]) = (&self.patch, [u as usize, v as usize]);
@@ -103,9 +106,11 @@ impl Work {
         let edge = place(patch.points[j]) - from;
         let sum = patch.quadrics[i].wide().plus(&patch.quadrics[j].wide().around(-edge));
         let share = sum.weight().max(1.0).recip();
+        let scale = share.sqrt();
         let cost = |x: DVec3| {
             let value = sum.at(x);
-            (value * share, value + STABILITY * STABILITY * (x.length_squared() + (x - edge).length_squared()))
+            let short = STABILITY * STABILITY * (x.length_squared() + (x - edge).length_squared());
+            (value * share, value * scale + short)
         };
         if kinds[0] != kinds[1] {
             let (x, point) = if kinds[0] > kinds[1] { (DVec3::ZERO, patch.points[i]) } else { (edge, patch.points[j]) };
@@ -114,7 +119,7 @@ impl Work {
         }
         let rounded = |x: DVec3| (from + x).to_array().map(|x| x as f32 + 0.0);
         let least = (self.rules.optimal && kinds[0] != CREASE)
-            .then(|| sum.least(2.0 * STABILITY * STABILITY, 0.5 * edge))
+            .then(|| sum.least(2.0 * STABILITY * STABILITY / scale, 0.5 * edge))
             .filter(|x| x.length_squared() < 4.0 * edge.length_squared());
         if let Some(x) = least {
             // The cost is least there, so that the ends need not be looked at.

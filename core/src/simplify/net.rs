@@ -42,16 +42,15 @@ impl Net {
     /// O(n).
     pub(super) fn new(points: &[Point], faces: &[[u32; 3]], constraints: &Constraints<'_>) -> Self {
         let (starts, corners) = corners_by_vertex(points.len(), faces);
-        let known = (0..points.len()).into_par_iter().with_min_len(1 << 10).map(|v| {
+        let known = (0..points.len()).into_par_iter().with_min_len(1 << 10).map_init(Around::default, |around, v| {
             let own = corners.get(starts[v] as usize..starts[v + 1] as usize).unwrap_or_default();
             let is_fixed = constraints.fixed.get(v).copied().unwrap_or(false);
-            Around::new(points, faces, own).map_or(((FIXED, true), Quadric::default()), |around| {
-                let rim = around.rim(constraints.feature);
-                let across = rim.iter().flat_map(|rim| rim.across).map(|n| n * RIM_WEIGHT.sqrt());
-                let quadric = Quadric::of_normals(around.normals().chain(across));
-                let kind = if is_fixed { FIXED } else { kind(&around, constraints.feature) };
-                ((kind, !around.is_closed()), quadric)
-            })
+            let Some(around) = around.of(points, faces, own) else { return ((FIXED, true), Quadric::default()) };
+            let rim = around.rim(constraints.feature);
+            let across = rim.iter().flat_map(|rim| rim.across).map(|n| n * RIM_WEIGHT.sqrt());
+            let quadric = Quadric::of_normals(around.normals().chain(across));
+            let kind = if is_fixed { FIXED } else { kind(around, constraints.feature) };
+            ((kind, !around.is_closed()), quadric)
         });
         let (known, quadrics): (Vec<(u8, bool)>, _) = known.unzip();
         let open = (0..).zip(&known).filter(|(_, known)| known.1).map(|(v, _)| v).collect();

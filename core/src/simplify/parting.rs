@@ -132,10 +132,11 @@ impl Parting<'_> {
         let mut vertices: Vec<u32> = mixed.iter().flat_map(|f| mesh.faces[*f as usize]).collect();
         vertices.sort_unstable();
         vertices.dedup();
+        let mut around = Around::default();
         for v in vertices {
             let own = &corners[starts[v as usize] as usize..starts[v as usize + 1] as usize];
             let home = mesh.homes[v as usize];
-            let around = Around::new(&mesh.points, &mesh.faces, own);
+            let around = around.of(&mesh.points, &mesh.faces, own);
             let has_fan = match self.first.open.binary_search(&home) {
                 Err(_) => around.is_some_and(|around| around.is_closed()),
                 Ok(_) => self.first.kinds[home as usize] == RIM && around.is_some_and(|around| around.rim(-2.0).is_some()),

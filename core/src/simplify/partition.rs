@@ -6,6 +6,9 @@
 use crate::geometry::exact::Point;
 use crate::geometry::sums::Bounds;
 
+/// So many vertices tell where a plane is to be, about.
+const SAMPLE: usize = 1 << 10;
+
 /// A half-open box: from `lo`, and before `hi`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Cell {
@@ -112,18 +115,21 @@ fn plane(points: &[Point], order: &mut [u32], planes: Planes) -> Option<(usize, 
     let width = |k: &usize| f64::from(bounds.hi[*k]) - f64::from(bounds.lo[*k]);
     let mut axes = [0, 1, 2];
     axes.sort_by(|a, b| width(b).total_cmp(&width(a)));
-    let wanted = (order.len() as f64 * planes.below) as usize;
     for axis in axes.into_iter().filter(|k| width(k) > 0.0) {
         let along = |v: &u32| points[*v as usize][axis];
-        order.select_nth_unstable_by(wanted.min(order.len() - 1), |a, b| along(a).total_cmp(&along(b)));
-        let middle = along(&order[wanted.min(order.len() - 1)]);
+        let mut some: Vec<f32> = order.iter().step_by(order.len().div_ceil(SAMPLE)).map(along).collect();
+        some.sort_unstable_by(f32::total_cmp);
+        let rank = (some.len() as f64 * planes.below) as usize;
+        let middle = some.get(rank).copied().unwrap_or(bounds.lo[axis]);
+        let count = partition_in_place(order, |v| along(v) < middle);
+        if count > 0 && count < order.len() {
+            return Some((axis, middle, count));
+        }
         // Where many are at the plane, the next one above it parts as well.
         let next = order.iter().map(along).filter(|x| *x > middle).fold(f32::INFINITY, f32::min);
-        for at in [middle, next] {
-            let count = partition_in_place(order, |v| along(v) < at);
-            if count > 0 && count < order.len() {
-                return Some((axis, at, count));
-            }
+        let count = partition_in_place(order, |v| along(v) < next);
+        if count > 0 && count < order.len() {
+            return Some((axis, next, count));
         }
     }
     None

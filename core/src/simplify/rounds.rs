@@ -18,17 +18,29 @@ const STEP: f64 = 0.7;
 /// Steps of a round, at most; each does about a half of what is left.
 const STEPS: usize = 24;
 
+/// Items that a thread takes at once.
+const BLOCK: usize = 1 << 12;
+
 /// A step looks at so many times as many edges as are to collapse, at most.
 const LEAST_YIELD: f64 = 0.02;
+
+/// A cell, and a place in it.
+#[derive(Clone, Copy, Default)]
+struct Seat {
+    cell: u32,
+    place: u32,
+}
 
 /// The mesh in cells.
 struct Parted {
     partition: Partition,
-    /// The place of a vertex in the order of all cells.
-    places: Vec<u32>,
+    /// By vertices, its cell and its place among those of the cell.
+    seats: Vec<Seat>,
     /// Faces by cells, from where to where.
     faces: Vec<u32>,
     starts: Vec<usize>,
+    /// By faces, its cell and its place there; [`NONE`] for the cell of those of more than one.
+    face_seats: Vec<Seat>,
     /// Vertices of such triangles.
     is_shared: Vec<bool>,
     /// By cells, which of these triangles reach into them.
@@ -40,32 +52,35 @@ struct Parted {
 impl Parted {
     fn new(net: &Net, planes: Planes) -> Self {
         let partition = Partition::new(&net.points, planes);
-        let mut places = vec![0_u32; net.points.len()];
-        let mut cells = vec![0_u32; net.points.len()];
-        for (c, cell) in partition.cells.iter().enumerate() {
-            for (i, v) in partition.order.iter().enumerate().take(cell.end).skip(cell.start) {
-                (places[*v as usize], cells[*v as usize]) = (i as u32, c as u32);
+        let mut seats = vec![Seat::default(); net.points.len()];
+        for (c, cell) in (0..).zip(&partition.cells) {
+            for (place, v) in (0..).zip(&partition.order[cell.start..cell.end]) {
+                seats[*v as usize] = Seat { cell: c, place };
             }
         }
         let cell_of = |face: &[u32; 3]| {
-            let [a, b, c] = face.map(|v| cells[v as usize]);
-            if a == b && b == c { a } else { NONE }
+            let [a, b, c] = face.map(|v| seats[v as usize].cell);
+            Seat { cell: if a == b && b == c { a } else { NONE }, place: 0 }
         };
-        let of_faces: Vec<u32> = net.faces.par_iter().with_min_len(1 << 12).map(cell_of).collect();
-        let mut starts = vec![0_usize; partition.cells.len() + 1];
-        of_faces.iter().filter(|c| **c != NONE).for_each(|c| starts[*c as usize + 1] += 1);
-        for c in 1..starts.len() {
-            starts[c] += starts[c - 1];
+        let mut face_seats: Vec<Seat> = net.faces.par_iter().with_min_len(BLOCK).map(cell_of).collect();
+        let mut counts = vec![0_u32; partition.cells.len()];
+        for seat in &mut face_seats {
+            if let Some(count) = counts.get_mut(seat.cell as usize) {
+                seat.place = *count;
+                *count += 1;
+            }
         }
-        let mut ends = starts.clone();
+        let mut starts = vec![0_usize; partition.cells.len() + 1];
+        for (c, count) in counts.iter().enumerate() {
+            starts[c + 1] = starts[c] + *count as usize;
+        }
         let mut faces = vec![0_u32; starts.last().copied().unwrap_or(0)];
         let mut is_shared = vec![false; net.points.len()];
         let mut obstacles = vec![Vec::new(); partition.cells.len()];
         let mut outer = vec![Vec::new(); partition.cells.len()];
-        for (f, c) in of_faces.iter().enumerate() {
-            if let Some(at) = ends.get_mut(*c as usize) {
-                faces[*at] = f as u32;
-                *at += 1;
+        for (f, seat) in face_seats.iter().enumerate() {
+            if seat.cell != NONE {
+                faces[starts[seat.cell as usize] + seat.place as usize] = f as u32;
                 continue;
             }
             let face = net.faces[f];
@@ -74,15 +89,14 @@ impl Parted {
             partition.each_meeting(&bounds, &mut |cell| obstacles[cell].push(f as u32));
             for k in 0..3 {
                 let ends = [face[k], face[(k + 1) % 3]];
-                let [c, d] = ends.map(|v| cells[v as usize] as usize);
-                if c == d {
-                    let [v, w] = ends.map(|v| places[v as usize] - partition.cells[c].start as u32);
-                    outer[c].push([v.min(w), v.max(w)]);
+                let [from, to] = ends.map(|v| seats[v as usize]);
+                if from.cell == to.cell {
+                    outer[from.cell as usize].push([from.place.min(to.place), from.place.max(to.place)]);
                 }
             }
         }
         outer.iter_mut().for_each(|edges| edges.sort_unstable());
-        Self { partition, places, faces, starts, is_shared, obstacles, outer }
+        Self { partition, seats, faces, starts, face_seats, is_shared, obstacles, outer }
     }
 
     fn vertices(&self, c: usize) -> &[u32] {
@@ -95,14 +109,13 @@ impl Parted {
     }
 
     fn patch(&self, net: &Net, c: usize) -> Patch {
-        let (vertices, start) = (self.vertices(c), self.partition.cells[c].start as u32);
+        let vertices = self.vertices(c);
         let points = vertices.iter().map(|v| net.points[*v as usize]).collect();
         let quadrics = vertices.iter().map(|v| net.quadrics[*v as usize]).collect();
         let kind = |v: &u32| if self.is_shared[*v as usize] { FIXED } else { net.kinds[*v as usize] };
         let kinds = vertices.iter().map(kind).collect();
         let strict = vertices.iter().map(|v| net.strict[*v as usize]).collect();
-        let corners =
-            self.faces(c).iter().flat_map(|f| net.faces[*f as usize].map(|v| self.places[v as usize] - start)).collect();
+        let corners = self.faces(c).iter().flat_map(|f| net.faces[*f as usize].map(|v| self.seats[v as usize].place)).collect();
         Patch::new(points, quadrics, [kinds, strict], corners)
     }
 
@@ -157,7 +170,7 @@ pub(super) fn round(net: &mut Net, rules: Rules, planes: Planes, goal: Goal) -> 
         })
         .collect();
     let is_limited = works.iter().any(|work| work.is_limited);
-    let became = merge(net, &parted, works);
+    let became = merge(net, &parted, &works);
     Round { became, redone: redone.into_iter().filter(|was| *was).count(), is_limited }
 }
 
@@ -234,63 +247,42 @@ fn in_parts(number: usize, shares: &[usize]) -> Vec<usize> {
 }
 
 /// Makes one mesh of all cells and what they share, in the old order. Returns what each old vertex has become.
-fn merge(net: &mut Net, parted: &Parted, works: Vec<Work>) -> Vec<u32> {
-    // The vertex that each one has become, by its old number.
-    let mut became: Vec<u32> = (0..net.points.len() as u32).collect();
-    let mut is_gone = vec![false; net.faces.len()];
-    for (c, work) in works.into_iter().enumerate() {
-        let vertices = parted.vertices(c);
-        let patch = work.patch;
-        for (i, v) in vertices.iter().enumerate() {
-            let mut at = i as u32;
-            while patch.became[at as usize] != at {
-                at = patch.became[at as usize];
-            }
-            became[*v as usize] = vertices[at as usize];
-            net.points[*v as usize] = patch.points[i];
-            net.quadrics[*v as usize] = patch.quadrics[i];
-            net.strict[*v as usize] = patch.strict[i];
+fn merge(net: &mut Net, parted: &Parted, works: &[Work]) -> Vec<u32> {
+    let old = |v: u32| {
+        let Seat { cell, place } = parted.seats[v as usize];
+        let patch = &works[cell as usize].patch;
+        let mut at = place;
+        while patch.became[at as usize] != at {
+            at = patch.became[at as usize];
         }
-        for (corners, f) in patch.corners.chunks_exact(3).zip(parted.faces(c)) {
-            is_gone[*f as usize] = corners[0] == NONE;
-            if let (&[a, b, c], false) = (corners, corners[0] == NONE) {
-                net.faces[*f as usize] = [a, b, c].map(|v| vertices[v as usize]);
-            }
-        }
-    }
-    compact(net, &mut became, &is_gone);
+        parted.vertices(cell as usize)[at as usize]
+    };
+    // The vertex that each one has become, by its old number; then by its new one.
+    let mut became: Vec<u32> = (0..net.points.len() as u32).into_par_iter().with_min_len(BLOCK).map(old).collect();
+    let kept: Vec<u32> = (0..).zip(&became).filter(|(v, became)| *v == **became).map(|(v, _)| v).collect();
+    let mut numbers = vec![NONE; became.len()];
+    (0..).zip(&kept).for_each(|(number, v)| numbers[*v as usize] = number);
+    let face = |f: usize| {
+        let Seat { cell, place } = parted.face_seats[f];
+        let Some(work) = works.get(cell as usize) else { return Some(net.faces[f].map(|v| numbers[v as usize])) };
+        let vertices = parted.vertices(cell as usize);
+        let corners = work.patch.face(place as usize);
+        (corners[0] != NONE).then(|| corners.map(|v| numbers[vertices[v as usize] as usize]))
+    };
+    let faces = (0..net.faces.len()).into_par_iter().with_min_len(BLOCK).filter_map(|f| Some((face(f)?, net.origins[f])));
+    (net.faces, net.origins) = faces.unzip();
+    let of = |v: &u32| {
+        let Seat { cell, place } = parted.seats[*v as usize];
+        (&works[cell as usize].patch, place as usize)
+    };
+    let gather = || kept.par_iter().with_min_len(BLOCK);
+    net.points = gather().map(|v| of(v).0.points[of(v).1]).collect();
+    net.quadrics = gather().map(|v| of(v).0.quadrics[of(v).1]).collect();
+    net.strict = gather().map(|v| of(v).0.strict[of(v).1]).collect();
+    net.kinds = gather().map(|v| net.kinds[*v as usize]).collect();
+    net.homes = gather().map(|v| net.homes[*v as usize]).collect();
+    became.par_iter_mut().with_min_len(BLOCK).for_each(|v| *v = numbers[*v as usize]);
     became
-}
-
-/// Lets go of what is gone.
-fn compact(net: &mut Net, became: &mut [u32], is_gone: &[bool]) {
-    let mut numbers = vec![NONE; net.points.len()];
-    let mut count = 0;
-    for v in 0..net.points.len() {
-        if became[v] == v as u32 {
-            numbers[v] = count as u32;
-            net.points[count] = net.points[v];
-            net.quadrics[count] = net.quadrics[v];
-            net.kinds[count] = net.kinds[v];
-            net.strict[count] = net.strict[v];
-            net.homes[count] = net.homes[v];
-            count += 1;
-        }
-    }
-    net.points.truncate(count);
-    net.quadrics.truncate(count);
-    net.kinds.truncate(count);
-    net.strict.truncate(count);
-    net.homes.truncate(count);
-    let mut left = 0;
-    for f in (0..net.faces.len()).filter(|f| !is_gone[*f]) {
-        net.faces[left] = net.faces[f].map(|v| numbers[v as usize]);
-        net.origins[left] = net.origins[f];
-        left += 1;
-    }
-    net.faces.truncate(left);
-    net.origins.truncate(left);
-    became.iter_mut().for_each(|v| *v = numbers[*v as usize]);
 }
 
 #[cfg(test)]

@@ -79,7 +79,7 @@ fn a_deviation_is_kept_and_a_larger_one_leaves_less() {
 fn places_that_miss_a_deviation_are_done_again() {
     let (points, faces) = torus(60, 0.3);
     let open: Vec<u32> = (0..points.len() as u32).collect();
-    for (wanted, most) in [(None, 0.1), (Some(900), 0.1)] {
+    for (wanted, most) in [(None, 0.05), (Some(900), 0.05)] {
         let options = Options { triangles: wanted, max_deviation: Some(most), ..Options::default() };
         let with = |threads: usize| in_pool(threads, || in_cells(&all(&points, &faces), &options, 300).unwrap());
         let outcome = with(1);

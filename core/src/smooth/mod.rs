@@ -87,15 +87,13 @@ fn movable(points: &[Point], faces: &[[u32; 3]], region: Option<&[bool]>, featur
     }
     let (corner_starts, corners) = corners_by_vertex(points.len(), faces);
     let cosine = feature.map_or(-2.0, f64::cos);
-    let around = |v: usize| {
+    let neighbours = |around: &mut Around, v: usize| {
         let own = corners.get(corner_starts[v] as usize..corner_starts[v + 1] as usize).unwrap_or_default();
-        Around::new(points, faces, own).filter(|around| !stays[v] && around.features(cosine) == Some(0))
+        let around = around.of(points, faces, own).filter(|around| !stays[v] && around.features(cosine) == Some(0));
+        around.map_or_else(Vec::new, |around| around.neighbours().collect())
     };
-    let lists: Vec<Vec<u32>> = (0..points.len())
-        .into_par_iter()
-        .with_min_len(1 << 10)
-        .map(|v| around(v).map_or_else(Vec::new, |around| around.neighbours().collect()))
-        .collect();
+    let lists: Vec<Vec<u32>> =
+        (0..points.len()).into_par_iter().with_min_len(1 << 10).map_init(Around::default, neighbours).collect();
     let mut starts = Vec::with_capacity(points.len() + 1);
     starts.push(0);
     let mut sum = 0;

@@ -74,17 +74,32 @@ impl Weld {
     #[inline(always)]
     pub(crate) fn vertices(&mut self, points: &[Point], vertices: &mut [u32]) {
         self.reserve(points.len());
-        let mut buckets = [0usize; BATCH];
-        for (p, bucket) in points.iter().zip(&mut buckets) {
-            *bucket = self.bucket_of(canonical(*p));
-            prefetch(&self.buckets[*bucket]);
-        }
+        let buckets = self.asked_for(points);
         for ((p, bucket), vertex) in points.iter().zip(buckets).zip(vertices) {
             let position = canonical(*p);
             *vertex = match self.probe(position, bucket) {
                 Ok(vertex) => vertex,
                 Err(bucket) => self.insert(bucket, position),
             };
+        }
+    }
+
+    /// The buckets where searches for positions begin, at most [`BATCH`] of them; their lines are on the way.
+    #[inline(always)]
+    fn asked_for(&self, points: &[Point]) -> [usize; BATCH] {
+        let mut buckets = [0; BATCH];
+        for (p, bucket) in points.iter().zip(&mut buckets) {
+            *bucket = self.bucket_of(canonical(*p));
+            prefetch(&self.buckets[*bucket]);
+        }
+        buckets
+    }
+
+    /// The vertices at positions, at most [`BATCH`] of them, to `vertices`; [`NONE`] where there is none.
+    pub(crate) fn find_all(&self, points: &[Point], vertices: &mut [u32]) {
+        let buckets = self.asked_for(points);
+        for ((p, bucket), vertex) in points.iter().zip(buckets).zip(vertices) {
+            *vertex = self.probe(canonical(*p), bucket).unwrap_or(NONE);
         }
     }
 

@@ -82,7 +82,7 @@ fn mask(path: &Path, mesh: &Mesh, work: Work<'_>) -> Result<Vec<bool>, String> {
         return Err(format!("{shown}: a mask of so many triangles takes {needed} MiB of memory, and {given} MiB may be used"));
     }
     let corners: Vec<_> = file.records().iter().map(record::corners).collect();
-    let masking = Mesh::from_triangles(&corners).map_err(|error| format!("{shown}: {error}"))?;
+    let masking = Mesh::of_records(file.records()).map_err(|error| format!("{shown}: {error}"))?;
     Ok(within(mesh, &masking, &corners))
 }
 

@@ -19,7 +19,7 @@ use crate::contract::settings::Profile;
 use crate::engine::judging;
 use crate::engine::mesh::Mesh;
 use crate::engine::work::Work;
-use crate::io::record::{self, Record};
+use crate::io::record::Record;
 use crate::output::edit::Edit;
 use crate::util::parallel;
 pub(crate) use change::{Change, Told};
@@ -105,17 +105,14 @@ impl Step {
             return Ok(Err(self.refused(why)));
         }
         work.progress.at(self.stage(), 0, records.len() as u64);
-        let corners: Vec<_> = records.iter().map(record::corners).collect();
-        let mesh = match Mesh::from_triangles(&corners) {
-            Ok(mesh) => mesh,
-            Err(error) => return Ok(Err(self.refused(error.to_string()))),
-        };
-        drop(corners);
-        let found = parallel::in_pool(work.limits.threads, || match self {
-            Self::Features(below) => features::find(&mesh, below),
-            Self::Residue => residue::find(&mesh, origins, work),
-            Self::Smooth => smoothing::smooth(&mesh, work),
-            Self::Simplify => simplifying::simplify(&mesh, work),
+        let found = parallel::in_pool(work.limits.threads, || {
+            let mesh = Mesh::of_records(records).map_err(|error| error.to_string())?;
+            match self {
+                Self::Features(below) => features::find(&mesh, below),
+                Self::Residue => residue::find(&mesh, origins, work),
+                Self::Smooth => smoothing::smooth(&mesh, work),
+                Self::Simplify => simplifying::simplify(&mesh, work),
+            }
         });
         if work.progress.cancelled() {
             return Err(Error::cancelled(path, self.stage()));

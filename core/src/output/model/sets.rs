@@ -3,7 +3,8 @@
 //! **In:** the text of an object's sets, and for each triangle of the output a triangle of the text that is in the same sets.
 //! **Out:** the text with other references where numbers are others. A set that had ranges has single triangles first, then ranges; another one has single
 //! triangles alone, since there are readers that know no others (lib3mf 2.5).
-//! **Promise:** a set whose numbers are the same stays byte for byte; of another one all but its references does.
+//! **Promise:** a set whose numbers are the same stays byte for byte, unless it refers to triangles that were not there, and may be now; of another one all
+//! but its references does.
 //!
 //! By the 3MF Core Specification 1.3, section 4.1, Triangle Sets. Triangles that are in the same sets are a class, so that whoever asks for a triangle's
 //! sets gets one number. Memory: 8 bytes for each range of a set, 24 for each place where sets begin or end, and the classes.
@@ -30,6 +31,8 @@ pub(super) struct Sets<'t> {
     stretches: Vec<(u32, u32)>,
     /// The sets of each class.
     classes: Vec<Vec<u32>>,
+    /// Triangles of the text.
+    triangles: u32,
 }
 
 /// A set.
@@ -39,6 +42,8 @@ struct Set {
     members: Vec<Range<u32>>,
     /// It refers to ranges, too.
     has_ranges: bool,
+    /// It refers to triangles that are not there.
+    is_astray: bool,
 }
 
 /// The classes of the output's triangles, in order.
@@ -64,7 +69,7 @@ impl<'t> Sets<'t> {
     pub(super) fn parse(text: &'t [u8], range: Range<usize>, triangles: u32) -> Option<Self> {
         let sets = sets(text, range.clone(), triangles)?;
         let (stretches, classes) = classes(&sets)?;
-        Some(Self { text, range, sets, stretches, classes })
+        Some(Self { text, range, sets, stretches, classes, triangles })
     }
 
     /// The class of a triangle of the text. O(log n).
@@ -94,6 +99,7 @@ impl<'t> Sets<'t> {
     /// Writes the sets as they are in the output; `None`: they cannot be, and nothing is written.
     pub(super) fn write(&self, runs: &Runs, put: &mut dyn FnMut(&[u8])) -> Option<()> {
         let renumbered = self.renumbered(runs)?;
+        let are_more = runs.count > self.triangles;
         let mut writing = Writing { text: self.text, at: self.range.start, put };
         let mut sets = self.sets.iter().zip(&renumbered);
         let mut elements = Elements::within(self.text, self.range.clone());
@@ -102,7 +108,8 @@ impl<'t> Sets<'t> {
         while let Some(tag) = elements.next_tag() {
             match tag {
                 Tag::Start(element) if is_set(&element) => {
-                    let changed = sets.next().filter(|(set, now)| set.members != **now);
+                    let is_changed = |(set, now): &(&Set, &Vec<_>)| set.members != **now || (set.is_astray && are_more);
+                    let changed = sets.next().filter(is_changed);
                     open = changed.map(|(set, now)| (prefix(element.name), Some((set.has_ranges, now.as_slice()))));
                 }
                 Tag::Empty(element) if is_set(&element) => _ = sets.next(),
@@ -219,8 +226,13 @@ fn sets(text: &[u8], range: Range<usize>, triangles: u32) -> Option<Vec<Set>> {
             Tag::Start(element) | Tag::Empty(element) => {
                 if let (Some(set), Some(prefix)) = (all.last_mut(), open)
                     && is_reference(&element, prefix)
-                    && let Some(range) = referred(&element, triangles)
+                    && let Some(all) = referred(&element)
                 {
+                    set.is_astray |= all.end > triangles.into();
+                    let range = all.start.min(triangles.into()) as u32..all.end.min(triangles.into()) as u32;
+                    if range.is_empty() {
+                        continue;
+                    }
                     set.has_ranges |= local(element.name) == b"refrange";
                     let set = &mut set.members;
                     // Most sets are in order, and become short at once.
@@ -247,15 +259,14 @@ fn sorted(mut ranges: Vec<Range<u32>>) -> Vec<Range<u32>> {
     joined
 }
 
-/// The triangles that a reference is to, of so many.
-fn referred(element: &Element<'_>, triangles: u32) -> Option<Range<u32>> {
+/// The numbers that a reference is to, be there such triangles or not.
+fn referred(element: &Element<'_>) -> Option<Range<u64>> {
     let number = |name: &[u8]| std::str::from_utf8(element.value(name)?).ok()?.trim().parse::<u64>().ok();
     let (first, last) = match local(element.name) {
         b"ref" => (number(b"index")?, number(b"index")?),
         _ => (number(b"startindex")?, number(b"endindex")?),
     };
-    let end = last.saturating_add(1).min(triangles.into());
-    (first < end).then_some(first as u32..end as u32)
+    (first <= last).then(|| first..last.saturating_add(1))
 }
 
 type Classes = (Vec<(u32, u32)>, Vec<Vec<u32>>);

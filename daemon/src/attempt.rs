@@ -29,7 +29,7 @@ use crate::force::is_forced;
 use crate::fsx::Identity;
 use crate::handed::Handed;
 use crate::past::Unread;
-use crate::publish::{Conclusion, Desk, OUTPUT, discard};
+use crate::publish::{Conclusion, Desk, OUTPUT, discard, litter};
 use crate::publish_error::PublishError;
 use crate::pulse::Pulse;
 use crate::reuse::Sought;
@@ -116,7 +116,10 @@ impl Context {
     pub(crate) fn sweep(&self, job: &Job) {
         // Another daemon may have the folder, and a work folder of that name in it.
         if let (Kind::Parked, Some(folder)) = (job.kind(), self.folder(job).filter(|folder| folder.check().is_ok())) {
-            discard(folder, job);
+            match &folder.bucket {
+                None => discard(folder, job),
+                Some(shelf) => litter::discard(shelf, folder, job),
+            }
             remove_work(&folder.work(job.work_token()));
         }
     }
@@ -240,6 +243,10 @@ impl Slot {
         let reason = error.to_string();
         let step = match (&job.state, error) {
             (State::Running { .. }, PublishError::Folder(_)) => Step::Wait { reason },
+            // A name that could not be looked at, since its bucket does not answer.
+            (State::Running { .. }, _) if self.context.folder(job).is_some_and(|folder| folder.bucket.is_some()) => {
+                Step::Wait { reason }
+            }
             (State::Running { .. }, PublishError::Io { source, .. }) if ErrorClass::of(source) == ErrorClass::Shortage => {
                 Step::Wait { reason }
             }
@@ -291,8 +298,14 @@ impl Slot {
                 desk.intend(job, &Conclusion::None { ending: *ending, reason: reason.clone() })?
             }
             (Duty::Intend, State::Approved { publication, .. }) => desk.intend_approved(job, publication)?,
-            (Duty::Place, _) => desk.place(job)?,
-            (Duty::MoveOriginal, _) => desk.move_original(job)?,
+            (Duty::Place, _) => match &folder.bucket {
+                None => desk.place(job)?,
+                Some(shelf) => desk.place_in(shelf, job)?,
+            },
+            (Duty::MoveOriginal, _) => match &folder.bucket {
+                None => desk.move_original(job)?,
+                Some(shelf) => desk.move_in(shelf, job)?,
+            },
             _ => return Ok(None),
         };
         Ok(Some(next))

@@ -140,6 +140,12 @@ fn copied(
         let advice = "name an absolute path outside of it, where a `*` is the mesh's own name";
         return Err(format!("its profile's mask, `{pattern}`, is a mesh that the hot folder would repair itself: {advice}"));
     }
+    if folder.bucket.is_some() && !is_absolute {
+        let advice = "name an absolute path on this machine";
+        return Err(format!(
+            "its profile's {words}, `{pattern}`, lies beside the mesh, which is not done for folders in buckets: {advice}"
+        ));
+    }
     let from = beside(pattern, &folder.inbox().join(job.source.path.to_path()));
     let shown = if is_absolute { from.display().to_string() } else { name(&from) };
     let mut own = OsString::from(role.copy());

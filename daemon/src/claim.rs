@@ -15,9 +15,11 @@ use suture_core::ErrorClass;
 use suture_store::job::Withdrawal;
 use suture_store::{Job, Token};
 
+use crate::bucket::Trouble;
 use crate::create;
 use crate::folder::{Folder, make_parent};
 use crate::fsx::{self, Identity};
+use crate::shelf::Shelf;
 use crate::units::show_size;
 
 /// Name of the claimed file in its attempt's folder. Plain, whatever the dropped file is called.
@@ -122,18 +124,51 @@ pub(crate) fn is_source(found: &Identity, job: &Job) -> bool {
 /// # Errors
 /// When the file is gone or another one, or the world does not allow it.
 pub(crate) fn claim(folder: &Folder, job: &Job, work: &Path, free: u64) -> Result<Claimed, Unclaimed> {
+    if let Some(shelf) = &folder.bucket {
+        return fetch(folder, shelf, job, work, free);
+    }
     let (area, path) = job.original();
     let original = open(&folder.area(area).join(path.to_path()))?;
     let before = look(&original, job)?;
-    // Room for the result and for what the engine puts aside: a large file must not fill the disk half way.
-    let needed = before.size.saturating_mul(3);
+    has_room(before.size.saturating_mul(3), free)?;
+    // A new folder: what is in it, this attempt has put there.
+    make_parent(work).and_then(|()| std::fs::create_dir(work)).map_err(failed("the work folder cannot be made"))?;
+    take(original, job, &work.join(CLAIMED))
+}
+
+/// Room for the result and for what the engine puts aside: a large file must not fill the disk half way.
+fn has_room(needed: u64, free: u64) -> Result<(), Unclaimed> {
     if free < needed {
         let (needed, free) = (show_size(needed), show_size(free));
         return Err(Unclaimed::Shortage(format!("the disk has room for {free} more; this file may need {needed}")));
     }
-    // A new folder: what is in it, this attempt has put there.
+    Ok(())
+}
+
+/// Has the job's original, from its bucket, in `work`, which is made: the very version that the job is of.
+fn fetch(folder: &Folder, shelf: &Shelf, job: &Job, work: &Path, free: u64) -> Result<Claimed, Unclaimed> {
+    let (area, path) = job.original();
+    let away = |trouble: Trouble| match trouble {
+        Trouble::Changed => Unclaimed::Withdrawn(Withdrawal::Changed),
+        Trouble::Local(error) => failed("the file cannot be fetched")(error),
+        other => Unclaimed::Shortage(other.to_string()),
+    };
+    let key = Shelf::key(&folder.root, &folder.area(area).join(path.to_path())).map_err(failed("the file has no key"))?;
+    let Some(found) = shelf.bucket.stat(&key).map_err(away)? else {
+        shelf.bucket.must_be_there().map_err(away)?;
+        return Err(Unclaimed::Withdrawn(Withdrawal::Vanished));
+    };
+    if !Shelf::is_source(&found, job) {
+        return Err(Unclaimed::Withdrawn(Withdrawal::Changed));
+    }
+    // One more for the drop itself.
+    has_room(found.version.size.saturating_mul(4), free)?;
     make_parent(work).and_then(|()| std::fs::create_dir(work)).map_err(failed("the work folder cannot be made"))?;
-    take(original, job, &work.join(CLAIMED))
+    let claimed = work.join(CLAIMED);
+    shelf.cache.give(&shelf.bucket, &key, &found.version, &claimed).map_err(away)?;
+    let original = open(&claimed)?;
+    let identity = original.identity().map_err(failed("the file cannot be looked at"))?;
+    Ok(Claimed { original, identity, copied: false })
 }
 
 /// Gives the second name of an attempt's original up. That changes the time of the inode, which another attempt would take for a change of the file:

@@ -9,6 +9,7 @@ use std::time::Duration;
 use suture_core::Profile;
 use suture_store::{Address, Priority};
 
+use crate::bucket::address::BucketAddress;
 use crate::own_profile::OwnProfile;
 use crate::units::show_size;
 use crate::window::{RunWindow, TimeOfDay};
@@ -17,7 +18,9 @@ use events::Events;
 use keep::Keep;
 use taken::OnTaken;
 
+mod apart;
 pub(crate) mod api;
+mod bucket;
 pub(crate) mod command;
 pub(crate) mod events;
 pub(crate) mod keep;
@@ -34,12 +37,22 @@ const RESERVE: u64 = 256 << 20;
 /// A worker with less could not read a mesh of some thousand triangles.
 const LEAST_MEMORY: u64 = 4 << 20;
 
+/// Where a folder's parts are, if not on this machine.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct BucketConfig {
+    pub address: BucketAddress,
+    /// Bytes of drops that are kept in the scratch for another attempt.
+    pub cache: u64,
+}
+
 /// A hot folder to serve.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct FolderConfig {
     /// The name that jobs call it by.
     pub name: String,
     pub path: PathBuf,
+    /// Its parts are there, and `path` is the scratch of this machine.
+    pub bucket: Option<BucketConfig>,
     /// Profile of files that lie in no sub-folder.
     pub profile: String,
     /// Originals stay in `in/`, which may be read-only.
@@ -56,6 +69,7 @@ impl FolderConfig {
         Self {
             name: name_of(path),
             path: path.to_owned(),
+            bucket: None,
             profile: DEFAULT_PROFILE.into(),
             leave_originals: false,
             priority: Priority::default(),

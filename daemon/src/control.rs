@@ -22,7 +22,7 @@ use crate::force::folder_for;
 use crate::fsx::Identity;
 use crate::glance::{Glance, standing};
 use crate::left::{area, result_path};
-use crate::publish::approved::unfit;
+use crate::publish::approved::{NO_ATTEMPT, unfit};
 use crate::schedule::{Hold, Standing};
 use crate::standstill;
 
@@ -207,7 +207,12 @@ fn is_as_judged(context: &Context, job: &Job) -> Result<(), Refusal> {
     else {
         return Ok(());
     };
-    let why = match unfit(&path, hash) {
+    let there = match folder.filter(|folder| folder.bucket.is_some()) {
+        None => unfit(&path, hash),
+        // Its bytes are compared when they are fetched, which may take longer than who asks waits.
+        Some(folder) => folder.has(&path).map(|there| (!there).then_some(NO_ATTEMPT)),
+    };
+    let why = match there {
         Ok(None) => return Ok(()),
         Ok(Some(why)) => why.to_owned(),
         Err(error) => format!("{}: {error}", path.display()),

@@ -178,7 +178,7 @@ impl Teller<'_> {
 
     fn message<'n>(&'n self, notice: &'n Notice) -> Option<Message<'n>> {
         let folders = &self.context.folders;
-        Message::of(notice, &|name| folders.iter().find(|folder| folder.name == name).map(|folder| folder.root.as_path()))
+        Message::of(notice, &|name| folders.iter().find(|folder| folder.name == name).map(|folder| folder.place()))
     }
 
     /// Tries one message until it is delivered or given up; `false`: it is neither, and something else has to be done first.

@@ -17,6 +17,7 @@ pub(crate) use crate::ground::{FolderError, is_fading, make_parent};
 use crate::ground::{Ground, LOCK, PARTS, PRIVATE, Trace, id};
 use crate::receipt::{RECEIPT, REPORT};
 use crate::sentinel::{Answer, Sentinel};
+use crate::shelf::Shelf;
 
 /// Part of a hot folder that holds results.
 const OUT: &str = "out";
@@ -32,6 +33,8 @@ pub(crate) struct Folder {
     pub on_taken: OnTaken,
     /// Names of results that other systems take for the same.
     pub alike: Alike,
+    /// Its parts are there; here is only what this machine works on.
+    pub bucket: Option<Shelf>,
     ground: Mutex<Result<Ground, Trace>>,
     /// `None`: whoever looks waits as long as it takes.
     sentinel: Option<Sentinel>,
@@ -69,13 +72,14 @@ impl Folder {
     /// As [`Folder::open`]; also when it does not answer, and was never served before.
     pub(crate) fn open_guarded(config: &FolderConfig, known: Option<&Trace>) -> Result<Self, FolderError> {
         let root = absolute(config)?;
+        let bucket = shelf(config, &root)?;
         let sentinel = Sentinel::post(&root).map_err(FolderError::unseen(&root))?;
         let folder = match (sentinel.answers_at_last(), known) {
             (Answer::Yes, known) => Self::open(config, known)?,
             (_, Some(known)) => Self::at(root, config, Err(known.clone())),
             (_, None) => return Err(FolderError::Silent { root }),
         };
-        Ok(Self { sentinel: Some(sentinel), ..folder })
+        Ok(Self { sentinel: Some(sentinel), bucket, ..folder })
     }
 
     /// A folder that another daemon serves: it is away until that one lets go of it.
@@ -85,13 +89,22 @@ impl Folder {
     pub(crate) fn of_other(config: &FolderConfig) -> Result<Self, FolderError> {
         let root = std::path::absolute(&config.path).map_err(FolderError::unseen(&config.path))?;
         let trace = Trace::of_other(&root).map_err(FolderError::unseen(&root))?;
-        let sentinel = Sentinel::post(&root).map_err(FolderError::unseen(&root))?;
-        Ok(Self { sentinel: Some(sentinel), ..Self::at(root, config, Err(trace)) })
+        let (bucket, sentinel) = (shelf(config, &root)?, Sentinel::post(&root).map_err(FolderError::unseen(&root))?);
+        Ok(Self { sentinel: Some(sentinel), bucket, ..Self::at(root, config, Err(trace)) })
     }
 
     fn at(root: PathBuf, config: &FolderConfig, ground: Result<Ground, Trace>) -> Self {
         let FolderConfig { name, leave_originals, on_taken, .. } = config.clone();
-        Self { name, root, leave_originals, on_taken, alike: Alike::default(), ground: Mutex::new(ground), sentinel: None }
+        Self {
+            name,
+            root,
+            leave_originals,
+            on_taken,
+            alike: Alike::default(),
+            bucket: None,
+            ground: Mutex::new(ground),
+            sentinel: None,
+        }
     }
 
     fn ground(&self) -> MutexGuard<'_, Result<Ground, Trace>> {
@@ -121,6 +134,9 @@ impl Folder {
     pub(crate) fn check(&self) -> Result<(), String> {
         if self.sentinel.as_ref().is_some_and(|sentinel| sentinel.answers_at_last() != Answer::Yes) {
             return Err(self.silent());
+        }
+        if let Some(trouble) = self.bucket.as_ref().and_then(|shelf| shelf.bucket.trouble()) {
+            return Err(trouble);
         }
         match &*self.ground() {
             Ok(ground) => ground.check(&self.root),
@@ -182,6 +198,27 @@ impl Folder {
         format!("the disk of {} is nearly full", self.root.display())
     }
 
+    /// Is there something of that name, in a part of the folder, wherever that is?
+    ///
+    /// # Errors
+    /// As `lstat`, or when the bucket does not answer.
+    pub(crate) fn has(&self, path: &Path) -> io::Result<bool> {
+        match &self.bucket {
+            None => fsx::exists(path),
+            Some(shelf) => shelf.has(&self.root, path),
+        }
+    }
+
+    /// The absolute path or the address of the folder, for whoever is told of it.
+    pub(crate) fn place(&self) -> &Path {
+        self.bucket.as_ref().map_or(&self.root, |shelf| &shelf.place)
+    }
+
+    /// A path in a part of the folder, for people.
+    pub(crate) fn shown(&self, path: &Path) -> String {
+        self.bucket.as_ref().map_or_else(|| path.display().to_string(), |shelf| shelf.shown(&self.root, path))
+    }
+
     /// Where files are dropped.
     pub(crate) fn inbox(&self) -> PathBuf {
         self.root.join("in")
@@ -224,6 +261,11 @@ impl Folder {
         let first = parts.next()?.as_os_str().to_string_lossy().into_owned();
         parts.next().is_some().then_some(first)
     }
+}
+
+/// The folder's bucket, if it lies in one.
+fn shelf(config: &FolderConfig, scratch: &Path) -> Result<Option<Shelf>, FolderError> {
+    config.bucket.as_ref().map(|bucket| Shelf::open(&bucket.address, scratch, bucket.cache)).transpose()
 }
 
 /// Made once as an absolute path: the process may be asked to look again after hours.
@@ -333,165 +375,4 @@ pub(crate) fn name_kind(name: &OsStr) -> NameKind {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn meshes_litter_and_the_rest() {
-        for mesh in ["part.stl", "PART.STL", "a b$.Stl", "CON.stl", "scan.ply", "a.OBJ", "b.off", "c.amf"] {
-            assert_eq!(name_kind(OsStr::new(mesh)), NameKind::Mesh, "{mesh}");
-        }
-        for ignored in [
-            ".part.stl",
-            "part.stl.crdownload",
-            "part.stl.part",
-            "part.stl.report.json",
-            "part.stl.suture.json",
-            "~$part.stl",
-            "part.stl~",
-            "Thumbs.db",
-            "@eaDir",
-            "x.TMP",
-        ] {
-            assert_eq!(name_kind(OsStr::new(ignored)), NameKind::Ignored, "{ignored}");
-        }
-        for foreign in ["part.step", "notes.txt", "stl", "obj"] {
-            assert_eq!(name_kind(OsStr::new(foreign)), NameKind::Foreign, "{foreign}");
-        }
-    }
-
-    #[test]
-    fn meshes_of_other_formats_are_meant_notes_are_not() {
-        for (name, meant) in [("a.3mf", true), ("A.OBJ", true), ("link.stl", true), ("notes.txt", false), ("obj", false)] {
-            assert_eq!(is_meant(OsStr::new(name)), meant, "{name}");
-        }
-    }
-
-    #[test]
-    fn f17_a_folder_has_one_owner() {
-        let dir = tempfile::tempdir().unwrap();
-        let config = FolderConfig::of(dir.path());
-        let first = Folder::open(&config, None).unwrap();
-        assert!(first.inbox().is_dir() && first.out().is_dir());
-        match Folder::open(&config, None) {
-            Err(FolderError::Owned { pid, .. }) => assert_eq!(pid, Some(std::process::id())),
-            other => panic!("{other:?}"),
-        }
-        let other = Folder::of_other(&config).unwrap();
-        let why = [other.check(), other.regain()].map(Result::unwrap_err);
-        assert!(why[1].contains("is served by another daemon"), "{why:?}");
-        drop(first);
-        assert!(other.check().is_err(), "it is not taken by a look");
-        other.regain().unwrap();
-        other.check().unwrap();
-        assert!(matches!(Folder::open(&config, None), Err(FolderError::Owned { .. })));
-    }
-
-    /// D5: neither a folder that was made anew under the old name nor a store that was removed is taken for the one that was opened.
-    #[test]
-    fn a_folder_is_told_by_its_identity() {
-        let dir = tempfile::tempdir().unwrap();
-        let at = |name: &str| dir.path().join(name);
-        let config = FolderConfig::of(&at("hot"));
-        let folder = Folder::open(&config, None).unwrap();
-        folder.check().unwrap();
-        std::fs::remove_dir(at("hot/out")).unwrap();
-        folder.check().expect("a part may be made again");
-        std::fs::rename(at("hot"), at("old")).unwrap();
-        assert!(folder.check().unwrap_err().contains("out of reach"));
-        std::fs::create_dir(at("hot")).unwrap();
-        assert!(folder.check().unwrap_err().contains("another folder"));
-        Folder::open(&config, None).expect("it is another folder, and another daemon's to serve");
-        assert!(folder.check().is_err());
-        std::fs::remove_dir_all(at("hot")).unwrap();
-        std::fs::rename(at("old"), at("hot")).unwrap();
-        folder.check().expect("it is back");
-        std::fs::remove_dir_all(at("hot/.suture")).unwrap();
-        std::fs::create_dir_all(at("hot/.suture/work")).unwrap();
-        assert!(folder.check().is_err(), "the store went with it");
-    }
-
-    /// A bare folder under a mount that is gone is not the folder: nothing is made in it, nothing in it believed.
-    #[test]
-    fn f25_a_folder_is_away_until_it_is_back() {
-        let dir = tempfile::tempdir().unwrap();
-        let at = |name: &str| dir.path().join(name);
-        let config = FolderConfig::of(&at("hot"));
-        let here = Folder::open(&config, None).unwrap().trace();
-        let text = serde_json::to_string(&here).unwrap();
-        let mut there: serde_json::Value = serde_json::from_str(&text).unwrap();
-        there["mount"] = "/mnt/disk".into();
-        let there: Trace = serde_json::from_value(there).unwrap();
-        Folder::open(&config, Some(&there)).unwrap().check().expect("it has its mark");
-        std::fs::rename(at("hot"), at("disk")).unwrap();
-        std::fs::create_dir_all(at("hot/in")).unwrap();
-        let folder = Folder::open(&config, Some(&there)).unwrap();
-        for why in [folder.check(), folder.regain(), folder.missing().map_or(Ok(()), Err)] {
-            assert!(why.unwrap_err().contains("the mount /mnt/disk is not there"));
-        }
-        assert!(!at("hot/out").exists() && !at("hot/.suture").exists());
-        std::fs::remove_dir_all(at("hot")).unwrap();
-        std::fs::rename(at("disk"), at("hot")).unwrap();
-        folder.regain().unwrap();
-        folder.check().unwrap();
-        assert!(matches!(Folder::open(&config, None), Err(FolderError::Owned { .. })), "its lock is held");
-    }
-
-    /// A disk that is mounted again may be another device: the folder is told by its mark.
-    #[test]
-    fn f25_a_folder_with_its_mark_is_the_folder_whatever_its_inode() {
-        let dir = tempfile::tempdir().unwrap();
-        let at = |name: &str| dir.path().join(name);
-        let config = FolderConfig::of(&at("hot"));
-        let folder = Folder::open(&config, None).unwrap();
-        std::fs::rename(at("hot"), at("old")).unwrap();
-        std::fs::create_dir_all(at("hot/.suture")).unwrap();
-        assert!(folder.regain().unwrap_err().contains("another folder"));
-        std::fs::write(at("hot/.suture/id"), "some other\n").unwrap();
-        assert!(folder.regain().is_err());
-        std::fs::copy(at("old/.suture/id"), at("hot/.suture/id")).unwrap();
-        assert!(folder.check().is_err());
-        folder.regain().unwrap();
-        folder.check().unwrap();
-        assert!(at("hot/out").is_dir());
-    }
-
-    /// `out/` or `done/` that leads to `in/` made results of results, without end.
-    #[test]
-    fn a_part_that_leads_to_another_is_refused() {
-        let dir = tempfile::tempdir().unwrap();
-        let config = FolderConfig::of(dir.path());
-        for (part, target) in [("out", "in"), ("done", "in"), ("failed", "in/deep")] {
-            std::fs::create_dir_all(dir.path().join("in/deep")).unwrap();
-            std::os::unix::fs::symlink(target, dir.path().join(part)).unwrap();
-            assert!(matches!(Folder::open(&config, None), Err(FolderError::Mixed { .. })), "{part} -> {target}");
-            std::fs::remove_file(dir.path().join(part)).unwrap();
-        }
-        let folder = Folder::open(&config, None).unwrap();
-        std::fs::remove_dir(dir.path().join("out")).unwrap();
-        std::os::unix::fs::symlink("in", dir.path().join("out")).unwrap();
-        assert!(folder.check().unwrap_err().contains("results would be taken for drops"), "while it is served, too");
-    }
-
-    /// A hot folder in a part of another one, each with a daemon of its own: both would take its files.
-    #[test]
-    fn a_folder_within_a_hot_one_is_refused() {
-        let dir = tempfile::tempdir().unwrap();
-        let config = |path: PathBuf| FolderConfig::of(&path);
-        let _outer = Folder::open(&config(dir.path().into()), None).unwrap();
-        for inner in ["in", "in/sub/deeper", "out"] {
-            let opened = Folder::open(&config(dir.path().join(inner)), None);
-            assert!(matches!(opened, Err(FolderError::Within { .. })), "{inner}: {opened:?}");
-            assert!(!dir.path().join("in/sub").exists(), "nothing was made");
-        }
-        Folder::open(&config(dir.path().join("beside")), None).expect("not in a part");
-    }
-
-    #[test]
-    fn a_sub_folder_names_the_profile() {
-        let of = |text: &str| Folder::profile_folder(&RelPath::new(text.as_bytes()).unwrap());
-        assert_eq!(of("a.stl"), None);
-        assert_eq!(of("scan/a.stl").as_deref(), Some("scan"));
-        assert_eq!(of("scan/order 7/a.stl").as_deref(), Some("scan"));
-    }
-}
+mod tests;

@@ -170,8 +170,7 @@ pub(crate) fn folders(context: &Context) -> Vec<Served> {
     let served = |folder: &Arc<Folder>| {
         let reachable = folder.check().is_ok();
         let free_bytes = reachable.then(|| context.room(folder)).filter(|room| *room < u64::MAX);
-        let path = std::path::absolute(&folder.root).unwrap_or_else(|_| folder.root.clone());
-        Served { name: folder.name.clone(), path, reachable, free_bytes }
+        Served { name: folder.name.clone(), path: folder.place().to_owned(), reachable, free_bytes }
     };
     context.folders.iter().map(served).collect()
 }

@@ -40,6 +40,8 @@ pub(crate) enum FolderError {
     Mixed { a: PathBuf, b: PathBuf },
     #[error("{}: does not answer: its server is gone or its disk hangs; see to its mount (`umount -f` gives it up)", root.display())]
     Silent { root: PathBuf },
+    #[error("{0}")]
+    Bucket(String),
     #[error("{}: {action}: {source}", path.display())]
     Io { path: PathBuf, action: &'static str, source: io::Error },
 }
@@ -50,7 +52,7 @@ impl FolderError {
         match self {
             Self::Owned { .. } => true,
             Self::Io { source, .. } => ErrorClass::of(source) == ErrorClass::Shortage,
-            Self::Within { .. } | Self::Mixed { .. } | Self::Silent { .. } => false,
+            Self::Within { .. } | Self::Mixed { .. } | Self::Silent { .. } | Self::Bucket(_) => false,
         }
     }
 

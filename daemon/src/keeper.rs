@@ -28,6 +28,7 @@ use crate::settle::Rest;
 use crate::signals::Stop;
 use crate::taking::take;
 
+pub(crate) mod intake;
 mod news;
 mod once;
 mod room;
@@ -88,7 +89,7 @@ impl Keeper {
     /// Begins to listen; `inbox` receives what the context's events are told.
     pub(crate) fn new(context: &Arc<Context>, inbox: Receiver<Event>, stop: &Stop) -> Self {
         let (mut folders, now) = (Vec::new(), context.world.steady());
-        for folder in &context.folders {
+        for folder in context.folders.iter().filter(|folder| folder.bucket.is_none()) {
             let (rest, rescan) = pace(context, false);
             let mut kept = Kept {
                 folder: Arc::clone(folder),

@@ -9,6 +9,7 @@ mod attempt;
 mod bar;
 mod batch;
 mod beside;
+mod bucket;
 mod carry;
 mod choice;
 mod claim;
@@ -74,6 +75,7 @@ mod settings;
 mod settle;
 mod shaped;
 mod shared;
+mod shelf;
 mod shown;
 mod signals;
 #[cfg(test)]

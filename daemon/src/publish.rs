@@ -90,7 +90,7 @@ impl<'a> Desk<'a> {
     /// Writes report and receipt, chooses names, and makes the intent durable.
     pub(crate) fn intend(&self, job: &Job, result: &Conclusion) -> Result<Job, PublishError> {
         self.begin(job)?;
-        superseded::clear(self.folder, job);
+        superseded::clear(self.folder, job, &|| self.must_hold())?;
         crash_point("daemon.superseded");
         let barred = if result.is_good() { self.barred(job, result.ending())? } else { None };
         let publication = self.prepare(job, barred.as_ref().unwrap_or(result))?;
@@ -135,7 +135,7 @@ impl<'a> Desk<'a> {
         let reason = suture_store::job::one_line(&reason);
         let names = self.names(job, ending, output_hash.and(result.ending()))?;
         let target = if ending.is_good() { self.folder.out() } else { self.folder.area(ending.area()) };
-        let shown_source = self.folder.inbox().join(job.source.path.to_path()).display().to_string();
+        let shown_source = self.folder.shown(&self.folder.inbox().join(job.source.path.to_path()));
         let report_path = work.join(REPORT_FILE);
         let (mut recipe, mut copied) = (None, None);
         let report_hash = match result {
@@ -152,7 +152,7 @@ impl<'a> Desk<'a> {
                 let mut report = report.clone();
                 report.input.path = shown_source.into();
                 if let (Some(facts), Some(name)) = (&mut report.output, &names.output) {
-                    facts.path = target.join(name.to_path()).display().to_string().into();
+                    facts.path = self.folder.shown(&target.join(name.to_path())).into();
                 }
                 match reused {
                     None => rewrite(&report_path, &report)?,
@@ -349,7 +349,7 @@ impl<'a> Desk<'a> {
         };
         let (area, _) = base(self.folder, job, old);
         if let (Some(shown), Some(name)) = (report.pointer_mut("/output/path"), &names.output) {
-            *shown = area.join(name.to_path()).display().to_string().into();
+            *shown = self.folder.shown(&area.join(name.to_path())).into();
         }
         let input_hash = report.pointer("/input/blake3").and_then(|v| v.as_str()).and_then(|text| text.parse().ok());
         let report_hash = rewrite(&path, &report)?;
@@ -476,7 +476,11 @@ fn rewrite<T: Serialize>(path: &Path, value: &T) -> Result<Hash, PublishError> {
 }
 
 pub(crate) mod approved;
+mod bucket;
+#[cfg(test)]
+mod bucket_tests;
 mod called;
 mod carried;
+pub(crate) mod litter;
 #[cfg(test)]
 pub(crate) mod tests;

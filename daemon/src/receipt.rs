@@ -128,15 +128,29 @@ pub(crate) fn read(path: &Path) -> Option<Told> {
 pub(crate) fn try_read(path: &Path) -> io::Result<Told> {
     let file = create::open_to_read(path)?;
     let meta = file.metadata()?;
-    let damaged = |why: &str| io::Error::new(io::ErrorKind::InvalidData, why.to_owned());
     if !meta.is_file() || meta.len() > LONGEST {
         return Err(damaged("it is no receipt"));
     }
-    let told: Told = serde_json::from_reader(BufReader::new(file))?;
+    of_version(serde_json::from_reader(BufReader::new(file))?)
+}
+
+/// The receipt that was read from elsewhere.
+///
+/// # Errors
+/// As [`try_read`].
+pub(crate) fn from_bytes(bytes: &[u8]) -> io::Result<Told> {
+    of_version(serde_json::from_slice(bytes)?)
+}
+
+fn of_version(told: Told) -> io::Result<Told> {
     match told.receipt_version {
         RECEIPT_VERSION => Ok(told),
         other => Err(damaged(&format!("it has version {other}; this program knows version {RECEIPT_VERSION}"))),
     }
+}
+
+fn damaged(why: &str) -> io::Error {
+    io::Error::new(io::ErrorKind::InvalidData, why.to_owned())
 }
 
 /// The report of a file without one of the engine's: unreadable, refused, put off for good, quarantined, or without a name for its result.

@@ -5,10 +5,11 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 use std::sync::{Arc, PoisonError, RwLock};
 
+use crate::bucket::address::BucketAddress;
 use crate::cli::WatchArgs;
 use crate::config::api::Api;
 use crate::config::taken::OnTaken;
-use crate::config::{Config, FolderConfig, read, real, show};
+use crate::config::{BucketConfig, Config, FolderConfig, read, real, show};
 use crate::signals::Hangup;
 
 /// The configuration in force, and where it comes from.
@@ -75,6 +76,12 @@ impl Settings {
 fn from_args(args: &WatchArgs) -> Result<Config, String> {
     let mut config = match (&args.config, &args.dir) {
         (Some(file), _) => read::from_file(file)?,
+        (None, Some(dir)) if dir.to_str().and_then(BucketAddress::parse).is_some() => {
+            return Err(format!(
+                "{}: a folder in a bucket is served from a configuration that names a `state` folder, with --config",
+                dir.display()
+            ));
+        }
         (None, Some(dir)) => Config::for_folder(dir),
         (None, None) => return Err("name a folder, or a file with --config".into()),
     };
@@ -104,8 +111,8 @@ fn fixed(old: &Config, new: &Config) -> Vec<String> {
     if old.api != new.api {
         fixed.push("`[api]`".to_owned());
     }
-    let places = |config: &Config| -> BTreeMap<String, (PathBuf, bool, OnTaken)> {
-        let of = |folder: &FolderConfig| (real(&folder.path), folder.leave_originals, folder.on_taken);
+    let places = |config: &Config| -> BTreeMap<String, (PathBuf, Option<BucketConfig>, bool, OnTaken)> {
+        let of = |folder: &FolderConfig| (real(&folder.path), folder.bucket.clone(), folder.leave_originals, folder.on_taken);
         config.folders.iter().map(|folder| (folder.name.clone(), of(folder))).collect()
     };
     let (was, is) = (places(old), places(new));
@@ -243,6 +250,19 @@ mod tests {
         }
         let (reload, ..) = reloaded(&FIRST.replace("/nowhere/a", "/nowhere/b/../a"), &[]);
         assert_eq!(reload, Reload::Done(Vec::new()), "it is the same folder");
+    }
+
+    /// The scratch of a folder is called the same, wherever its bucket is.
+    #[test]
+    fn another_bucket_needs_a_restart() {
+        let dir = tempfile::tempdir().unwrap();
+        let file = dir.path().join("suture.toml");
+        let text = "state = \"/nowhere/state\"\n[[folders]]\npath = \"s3://prints/farm\"\n";
+        std::fs::write(&file, text).unwrap();
+        let settings = settings(&file, &[]);
+        std::fs::write(&file, text.replace("prints", "other")).unwrap();
+        let reload = settings.read_anew();
+        assert!(matches!(&reload, Reload::Refused(reason) if reason.ends_with("changes the folder `farm`")), "{reload:?}");
     }
 
     #[test]

@@ -6,47 +6,70 @@
 use std::path::Path;
 
 use suture_store::job::Area;
-use suture_store::{Job, RelPath};
+use suture_store::{Hash, Job, RelPath};
 
+use crate::bucket::Trouble;
+use crate::bucket::calls::Gate;
 use crate::folder::Folder;
 use crate::names::{best_of, with_suffix};
 use crate::receipt::{self, RECEIPT, REPORT};
 use crate::remove::remove;
+use crate::shelf::Shelf;
 
-/// Removes it. To be called when the new result is durable in its attempt's folder, and before its names are chosen.
-pub(crate) fn clear(folder: &Folder, job: &Job) {
-    if let Some((area, path)) = &job.moved_to {
-        clear_beside(folder, job, *area, path);
+/// Removes it. To be called when the new result is durable in its attempt's folder, and before its names are chosen. `gate` is
+/// asked before an object of a bucket goes: a worker that lost the job would take what another one has published since for what went before.
+///
+/// # Errors
+/// When the folder lies in a bucket that does not answer. What cannot be removed from a folder on this machine stays.
+pub(crate) fn clear(folder: &Folder, job: &Job, gate: Gate) -> Result<(), Trouble> {
+    match &job.moved_to {
+        Some((area, path)) => clear_beside(folder, job, (*area, path), gate),
+        None => Ok(()),
     }
 }
 
 /// The same for what stands beside the original of this name, or under its name where it stays in `in/`.
-pub(crate) fn clear_beside(folder: &Folder, job: &Job, area: Area, path: &RelPath) {
+///
+/// # Errors
+/// As [`clear`].
+pub(crate) fn clear_beside(folder: &Folder, job: &Job, (area, path): (Area, &RelPath), gate: Gate) -> Result<(), Trouble> {
     let root = folder.area(area);
     let base = root.join(path.to_path());
     let receipt = with_suffix(&base, RECEIPT);
-    let Some(told) = receipt::read(&receipt) else { return };
+    let told = match &folder.bucket {
+        None => receipt::read(&receipt),
+        Some(shelf) => shelf.receipt(&Shelf::key(&folder.root, &receipt)?)?,
+    };
+    let Some(told) = told else { return Ok(()) };
     if (told.job, &told.folder, told.source.as_ref()) != (job.id.0, &job.source.folder, Some(&job.source.path)) {
-        return;
+        return Ok(());
     }
     let best = told.output.filter(|output: &RelPath| *output == best_of(path)).map(|output| root.join(output.to_path()));
-    let gone = |path: &Path, hash| match path.symlink_metadata() {
-        Ok(_) => remove(path, hash).inspect_err(|reason| {
-            tracing::debug!(file = %path.display(), reason, "What an earlier attempt left stays.");
-        }),
-        Err(_) => Ok(()),
-    };
     let mut all = true;
     if let (Some(best), Some(hash)) = (best, told.output_blake3) {
-        all &= gone(&best, Some(hash)).is_ok();
+        all &= is_gone(folder, &best, Some(hash), gate)?;
     }
     if let Some(hash) = told.report_blake3 {
-        all &= gone(&with_suffix(&base, REPORT), Some(hash)).is_ok();
+        all &= is_gone(folder, &with_suffix(&base, REPORT), Some(hash), gate)?;
     }
     // It speaks of what is left.
     if all {
-        let _ = gone(&receipt, None);
+        is_gone(folder, &receipt, None, gate)?;
     }
+    Ok(())
+}
+
+/// Removes one of the files, if it still has its content. Returns whether there is none any more.
+fn is_gone(folder: &Folder, path: &Path, hash: Option<Hash>, gate: Gate) -> Result<bool, Trouble> {
+    let removed = match &folder.bucket {
+        None if path.symlink_metadata().is_err() => Ok(()),
+        None => remove(path, hash),
+        Some(shelf) => shelf.remove(&Shelf::key(&folder.root, path)?, hash, gate)?,
+    };
+    if let Err(reason) = &removed {
+        tracing::debug!(file = folder.shown(path), reason, "What an earlier attempt left stays.");
+    }
+    Ok(removed.is_ok())
 }
 
 #[cfg(test)]
@@ -87,15 +110,16 @@ mod tests {
             put(name, content);
         }
         let here = Some((Area::Failed, path.clone()));
-        clear(&folder, &job(8, here.clone()));
-        clear(&folder, &job(7, None));
+        let clear = |job: Job| clear(&folder, &job, &|| Ok(())).unwrap();
+        clear(job(8, here.clone()));
+        clear(job(7, None));
         assert_eq!(left(), all);
         // A person works on the best attempt: it stays, and so does what tells of it.
         put("a.best.stl", "by hand");
-        clear(&folder, &job(7, here.clone()));
+        clear(job(7, here.clone()));
         assert_eq!(left(), ["a.best.stl", "a.stl", "a.stl.suture.json"]);
         put("a.best.stl", "best");
-        clear(&folder, &job(7, here));
+        clear(job(7, here));
         assert_eq!(left(), ["a.stl"]);
     }
 }

@@ -27,6 +27,7 @@ use crate::fsx;
 use crate::glance::away;
 use crate::ground::read_traces;
 use crate::keeper::Keeper;
+use crate::keeper::intake::tend;
 use crate::manager::Manager;
 use crate::past::Unread;
 use crate::publish_error::PublishError;
@@ -84,7 +85,7 @@ pub(crate) fn serve(settings: Settings, once: bool, stop: &Stop, may_begin_anew:
             complain(&error);
             return match &error {
                 FolderError::Owned { .. } => Exit::Owned,
-                FolderError::Within { .. } | FolderError::Mixed { .. } => Exit::Refused,
+                FolderError::Within { .. } | FolderError::Mixed { .. } | FolderError::Bucket(_) => Exit::Refused,
                 FolderError::Silent { .. } => Exit::TryAgain,
                 FolderError::Io { source, .. } => Exit::of_start(source),
             };
@@ -328,6 +329,13 @@ impl Daemon {
                 served.unwrap_or_else(|error| context.fail(error));
             };
             thread("door").spawn_scoped(scope, serve).map(drop).map_err(no_thread)?;
+        }
+        for folder in self.folders.iter().filter(|folder| folder.bucket.is_some()) {
+            let look = move || {
+                let looked = guarded(|| tend(folder, context, &|| ended.load(Ordering::Relaxed) || context.has_failed()));
+                looked.unwrap_or_else(|error| context.fail(error));
+            };
+            thread("bucket").spawn_scoped(scope, look).map(drop).map_err(no_thread)?;
         }
         // Before anything is taken, whether a door opens or not.
         look_for_pause(context);

@@ -5,6 +5,7 @@ mod e2e {
     mod api;
     mod away;
     mod blind;
+    mod buckets;
     mod burst;
     mod cases;
     mod companions;

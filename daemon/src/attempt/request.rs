@@ -33,7 +33,7 @@ pub(super) fn request(
         report: None,
         witness: Some(work.join(WITNESS)),
         mark: Some(work.join(IN_HAND)),
-        shown_input: folder.inbox().join(job.source.path.to_path()).display().to_string(),
+        shown_input: folder.shown(&folder.inbox().join(job.source.path.to_path())),
         shown_output: None,
         profile,
         companions,

@@ -10,7 +10,9 @@ use suture_core::Profile;
 use suture_store::Priority;
 use toml::Spanned;
 
+use super::apart::apart;
 use super::api::Api;
+use super::bucket;
 use super::events::{self, OnDoneFile, WebhookFile};
 use super::keep::{Bound, Keep};
 use super::shared::StoreFile;
@@ -72,6 +74,8 @@ struct FolderFile {
     /// For a result whose name is taken.
     #[serde(default)]
     on_taken: OnTaken,
+    /// Of one in a bucket: bytes of drops that are kept on this machine.
+    cache: Option<Size>,
 }
 
 #[derive(Debug, Deserialize)]
@@ -224,6 +228,10 @@ fn from_text(text: &str) -> Result<Config, String> {
     let mut config = Config::for_folder(first.path.get_ref());
     config.profiles = own_profiles(text, file.profiles)?;
     config.folders = folders(text, &file.folders, &config)?;
+    for (folder, of_file) in config.folders.iter_mut().zip(&file.folders) {
+        let placed = bucket::place(folder, of_file.cache.as_ref().map(|size| size.0), file.state.as_deref());
+        placed.map_err(|what| with_line(text, of_file.path.span().start, &what))?;
+    }
     config.state = file.state.unwrap_or(config.state);
     config.store = file.store.map(|store| store.0);
     config.workers = file.workers.map_or(config.workers, |count| count.0);
@@ -243,7 +251,9 @@ fn from_text(text: &str) -> Result<Config, String> {
     config.run_window = file.run_window.unwrap_or_default();
     config.night_ends = file.night_ends.unwrap_or(config.night_ends);
     if let Some(of_file) = file.keep {
+        let at = of_file.span().start;
         config.keep = keep(text, of_file, &config.folders)?;
+        bucket::check(&config).map_err(|what| with_line(text, at, &what))?;
     }
     config.api = file.api.map(|of_file| api(text, of_file)).transpose()?;
     config.events = events::read(text, file.webhook, file.on_done)?;
@@ -328,35 +338,13 @@ fn folders(text: &str, of_file: &[FolderFile], config: &Config) -> Result<Vec<Fo
         }
         let (leave_originals, priority, on_taken) = (folder.leave_originals, folder.priority, folder.on_taken);
         let (path, profile) = (path.clone(), profile.to_owned());
-        folders.push(FolderConfig { name, path, profile, leave_originals, priority, on_taken });
+        folders.push(FolderConfig { name, path, bucket: None, profile, leave_originals, priority, on_taken });
     }
     apart(&folders).map_err(|(folder, what)| {
         let at = of_file.get(folder).map_or(0, |folder| folder.path.span().start);
         with_line(text, at, &what)
     })?;
     Ok(folders)
-}
-
-/// Are these hot folders that do not lie in one another, whatever their paths are called? A folder that is made only later is told by its
-/// path, through links and `..` as far as there is something. The number of the one that does, and a line for people.
-fn apart(folders: &[FolderConfig]) -> Result<(), (usize, String)> {
-    let real: Vec<PathBuf> = folders.iter().map(|folder| real(&folder.path)).collect();
-    for (i, a) in real.iter().enumerate() {
-        for (j, b) in real.iter().enumerate().filter(|(j, _)| *j != i) {
-            if let (true, Some(inner), Some(outer)) = (a.starts_with(b), folders.get(i), folders.get(j)) {
-                let (shown, other) = (inner.path.display(), outer.path.display());
-                let line = if a == b {
-                    format!("{shown} and {other} are the same folder; remove one of them")
-                } else {
-                    format!(
-                        "{shown} lies in the hot folder {other}, which would take its files; hot folders lie beside each other"
-                    )
-                };
-                return Err((i, line));
-            }
-        }
-    }
-    Ok(())
 }
 
 #[cfg(test)]

@@ -101,10 +101,16 @@ pub(crate) fn text(config: &Config) -> Result<String, String> {
     text += &format!("state = {}\n", path(&config.state));
     // Without the password: such a text is shown to people.
     text += &config.store.as_ref().map(|store| format!("store = {}\n", quoted(&store.to_string()))).unwrap_or_default();
-    for FolderConfig { name, path: root, profile, leave_originals, priority, on_taken } in &config.folders {
-        text += &format!("\n[[folders]]\npath = {}\nname = {}\nprofile = {}\n", path(root), quoted(name), quoted(profile));
+    for FolderConfig { name, path: root, bucket, profile, leave_originals, priority, on_taken } in &config.folders {
+        text += &format!(
+            "\n[[folders]]\npath = {}\nname = {}\nprofile = {}\n",
+            bucket.as_ref().map_or_else(|| path(root), |bucket| quoted(&bucket.address.to_string())),
+            quoted(name),
+            quoted(profile)
+        );
         text += &format!("leave_originals = {leave_originals}\npriority = {priority}\n");
         text += &format!("on_taken = {}\n", quoted(on_taken.name()));
+        text += &bucket.as_ref().map(|bucket| format!("cache = {}\n", quoted(&write_size(bucket.cache)))).unwrap_or_default();
     }
     text += &told(&config.events);
     if !config.profiles.is_empty() {
@@ -150,6 +156,8 @@ mod tests {
     use suture_store::{Address, Priority};
 
     use super::*;
+    use crate::bucket::address::BucketAddress;
+    use crate::config::BucketConfig;
     use crate::config::events::When;
     use crate::config::keep::Bound;
     use crate::config::read;
@@ -182,6 +190,18 @@ mod tests {
     }
 
     #[test]
+    fn a_folder_in_a_bucket_is_read_back() {
+        let address = BucketAddress::parse("s3://prints/\"farm\"").unwrap().unwrap();
+        let far = FolderConfig {
+            bucket: Some(BucketConfig { address, cache: 3 << 20 }),
+            path: "/srv/state/buckets/far".into(),
+            ..FolderConfig::of(Path::new("far"))
+        };
+        let config = Config { folders: vec![far], state: "/srv/state".into(), ..Config::for_folder(Path::new("far")) };
+        assert_eq!(read_back(&config), config);
+    }
+
+    #[test]
     fn whatever_is_set_is_read_back() {
         let mut config = Config::for_folder(Path::new("a \"b\"/'c'\\d\t"));
         config.state = "/srv/state of 2".into();
@@ -189,6 +209,7 @@ mod tests {
         config.folders.push(FolderConfig {
             name: "scans & more".into(),
             path: "scans".into(),
+            bucket: None,
             profile: "it's mine".into(),
             leave_originals: true,
             priority: Priority::HIGHEST,

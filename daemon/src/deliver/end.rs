@@ -70,13 +70,12 @@ pub(super) fn id(at: Time, seq: Seq) -> String {
 }
 
 impl<'a> End<'a> {
-    /// Of a job as it stood at its end; `None` where it stood at none. `root`: its hot folder, if that is still served.
+    /// Of a job as it stood at its end; `None` where it stood at none. `root`: the absolute path or the address of its hot folder, if that is still served.
     pub(super) fn of(job: &'a Job, root: Option<&Path>) -> Option<Self> {
         let paths = root.map_or_else(Paths::default, |root| {
-            let root = std::path::absolute(root).unwrap_or_else(|_| root.to_owned());
             let (place, name) = job.original();
             let original = Some(root.join(area(place)).join(name.to_path()));
-            Paths { output: result_path(&root, job), report: report_path(&root, job), original }
+            Paths { output: result_path(root, job), report: report_path(root, job), original }
         });
         Some(Self { id: id(job.changed, job.seq), event: Occasion::of(job)?, job, paths })
     }

@@ -62,8 +62,7 @@ impl<'a> Message<'a> {
                     News::FolderAway { folder, .. } | News::FolderBack { folder } => root(folder),
                     News::Night { .. } => None,
                 };
-                let root = folder.map(|root| std::path::absolute(root).unwrap_or_else(|_| root.to_owned()));
-                Some(Self::Word(Told { word, root }))
+                Some(Self::Word(Told { word, root: folder.map(Path::to_owned) }))
             }
         }
     }

@@ -18,8 +18,10 @@ impl Keeper {
     /// With `--once`: is everything that came to rest finished?
     pub(super) fn is_finished(&self) -> Result<bool, StoreError> {
         let folders_rest = self.folders.iter().all(|kept| !kept.dirty && (kept.unavailable || !kept.reconciler.is_settling()));
+        let buckets = self.context.folders.iter().filter_map(|folder| folder.bucket.as_ref());
+        let were_polled = buckets.into_iter().all(|shelf| shelf.was_polled.load(Ordering::Acquire));
         let counts = self.context.store.counts()?;
-        if !folders_rest || self.context.schedule.busy() > 0 || !self.inbox.is_empty() {
+        if !were_polled || !folders_rest || self.context.schedule.busy() > 0 || !self.inbox.is_empty() {
             return Ok(false);
         }
         // A slot that began or ended between these looks changed the counts: what it did is to be heard of first.
@@ -35,7 +37,7 @@ impl Keeper {
             return Ok(false);
         }
         let waiting = of(Kind::is_live);
-        if waiting > 0 || self.folders.iter().any(|kept| kept.unavailable) {
+        if waiting > 0 || self.folders.iter().any(|kept| kept.unavailable) || self.is_a_bucket_away() {
             tracing::warn!(
                 jobs = waiting,
                 "Some work is left for the next run: jobs that wait after errors, a full disk, a pause, the hours of work, or folders out of reach."
@@ -44,6 +46,13 @@ impl Keeper {
         }
         self.tell_of_foreign()?;
         Ok(true)
+    }
+
+    /// Did a bucket not answer when it was looked through?
+    fn is_a_bucket_away(&self) -> bool {
+        let away = self.context.away.lock().unwrap_or_else(PoisonError::into_inner);
+        let is_away = |name| away.get(name).is_some_and(|why| !why.is_empty());
+        self.context.folders.iter().any(|folder| folder.bucket.is_some() && is_away(&folder.name))
     }
 
     /// With `--once`: files that someone meant to have repaired, and that are left where they are, are not good.

@@ -7,7 +7,7 @@
 //! The copy is a file of its own: a person may have the best attempt open. From a kill on, either lies in `failed/` as it was, or the copy is whole.
 
 use std::io;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use suture_store::job::one_line;
 use suture_store::{Decision, Ending, Hash, Job, Publication, Step, crash_point};
@@ -15,11 +15,13 @@ use suture_store::{Decision, Ending, Hash, Job, Publication, Step, crash_point};
 use super::{Desk, OUTPUT, REPORT_FILE, base, read_json, rewrite};
 use crate::claim::Original;
 use crate::create;
+use crate::folder::make_parent;
 use crate::fsx;
 use crate::names::{ending_of_name, with_suffix};
 use crate::publish_error::{PublishError, io_at};
 use crate::receipt::REPORT;
 use crate::remove::ours;
+use crate::shelf::Shelf;
 use crate::superseded;
 
 /// Why the best attempt of a job cannot be published, if that is so: it is not there, or not as it was judged.
@@ -29,7 +31,7 @@ use crate::superseded;
 pub(crate) fn unfit(path: &Path, hash: Hash) -> io::Result<Option<&'static str>> {
     let is_file = fsx::look(path)?.map(|_| fsx::is_file(path)).transpose()?;
     Ok(match is_file {
-        None => Some("the best attempt is not there any more; `suture jobs retry` makes a new one"),
+        None => Some(NO_ATTEMPT),
         Some(true) if ours(path, Some(hash))?.is_some() => None,
         Some(_) => Some("the best attempt was changed since it was judged; `suture jobs retry` makes a new one"),
     })
@@ -45,20 +47,25 @@ impl Desk<'_> {
     /// Makes the intent to publish what a person approved durable, or says that it is not what was judged.
     pub(crate) fn intend_approved(&self, job: &Job, judged: &Publication) -> Result<Job, PublishError> {
         let work = self.begin(job)?;
-        if let Some(reason) = self.fetch(job, judged)? {
+        let brought = self.bring(job, judged)?;
+        let unfit = self.fetch(job, judged)?;
+        for path in &brought {
+            fsx::remove_if_there(path).map_err(io_at(path))?;
+        }
+        if let Some(reason) = unfit {
             return Ok(self.store.advance(self.claim, Step::Unfit { reason: reason.into() })?);
         }
         fsx::sync_dir(&work).map_err(io_at(&work))?;
         crash_point("daemon.approved_copied");
         let original = judged.original.as_ref().unwrap_or(&job.source.path);
-        superseded::clear_beside(self.folder, job, Ending::NeedsReview.area(), original);
+        superseded::clear_beside(self.folder, job, (Ending::NeedsReview.area(), original), &|| self.must_hold())?;
         crash_point("daemon.superseded");
         let path = work.join(REPORT_FILE);
         let mut report = read_json(&path)?;
         let ending = ending_of_name(judged.output.as_ref().unwrap_or(&job.source.path));
         let names = self.names(job, Ending::Repaired, Some(&ending))?;
         if let (Some(shown), Some(name)) = (report.pointer_mut("/output/path"), &names.output) {
-            *shown = self.folder.out().join(name.to_path()).display().to_string().into();
+            *shown = self.folder.shown(&self.folder.out().join(name.to_path())).into();
         }
         let input_hash = report.pointer("/input/blake3").and_then(|v| v.as_str()).and_then(|text| text.parse().ok());
         let publication = Publication {
@@ -74,6 +81,23 @@ impl Desk<'_> {
         };
         self.write_receipt(job, &publication, input_hash)?;
         self.intend_durably(job, publication)
+    }
+
+    /// Fetches best attempt and report from the folder's bucket, if it lies in one, to where they would lie on this machine; there is nothing else.
+    fn bring(&self, job: &Job, judged: &Publication) -> Result<Vec<PathBuf>, PublishError> {
+        let Some(shelf) = &self.folder.bucket else { return Ok(Vec::new()) };
+        let (area, base) = base(self.folder, job, judged);
+        let best = judged.output.as_ref().map(|name| area.join(name.to_path()));
+        let mut brought = Vec::new();
+        for path in best.into_iter().chain([area.join(with_suffix(&base, REPORT))]) {
+            let key = Shelf::key(&self.folder.root, &path).map_err(io_at(&path))?;
+            if let Some(found) = shelf.bucket.stat(&key)? {
+                make_parent(&path).map_err(io_at(&path))?;
+                shelf.bucket.fetch(&key, &found.version, &path)?;
+                brought.push(path);
+            }
+        }
+        Ok(brought)
     }
 
     /// Has best attempt and report in the attempt's folder, synced, be it from an interrupted try; why not, if that cannot be.
@@ -114,6 +138,8 @@ impl Desk<'_> {
     }
 }
 
+/// Why there is nothing to approve.
+pub(crate) const NO_ATTEMPT: &str = "the best attempt is not there any more; `suture jobs retry` makes a new one";
 const NO_REPORT: &str = "its report is not there any more as it was judged; `suture jobs retry` makes a new one";
 /// Where a report says who approved its result. The verdict stays what the engine found.
 const SIGNATURE: &str = "decision";

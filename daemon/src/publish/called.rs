@@ -8,8 +8,8 @@ use std::path::Path;
 use suture_store::{Ending, Job, RelPath};
 
 use super::{Conclusion, Desk};
-use crate::alike::Alike;
 use crate::config::taken::OnTaken;
+use crate::folder::Folder;
 use crate::force::{is_forced, plain};
 use crate::fsx;
 use crate::names::{BEST, COMPANION, Names, best_of, companions, first, with_ending};
@@ -22,24 +22,25 @@ impl Desk<'_> {
         let (now_area, now_path) = job.original();
         let area = self.folder.area(ending.area());
         let here = |path: &RelPath| now_area == ending.area() && now_path == path;
-        let original_free = |path: &RelPath| Ok(here(path) || is_free(&area, &path.to_path())?);
+        let folder = self.folder;
+        let original_free = |path: &RelPath| Ok(here(path) || is_free(folder, &area, &path.to_path())?);
         let out = self.folder.out();
         let dropped = plain(&job.source.path);
         if ending.is_for_want_of_a_name() && ending.is_good() {
             // Only a report and a receipt, named after the original, and not beside what is another's.
-            let free = |path: &RelPath| Ok(original_free(path)? && is_free_for_result(&self.folder.alike, &out, path)?);
+            let free = |path: &RelPath| Ok(original_free(path)? && is_free_for_result(folder, &out, path)?);
             let original = first(&dropped, COMPANION, free)?;
             return Ok(Names { output: None, original });
         }
         if ending.is_good() {
             let wanted = output.map_or_else(|| dropped.clone(), |ending| with_ending(&dropped, ending));
-            let result = first(&wanted, COMPANION, |path| is_free_for_result(&self.folder.alike, &out, path))?;
+            let result = first(&wanted, COMPANION, |path| is_free_for_result(folder, &out, path))?;
             return Ok(Names { output: Some(result), original: first(&dropped, 0, original_free)? });
         }
         let best = |path: &RelPath| best_of(&output.map_or_else(|| path.clone(), |ending| with_ending(path, ending)));
         let path = if now_area == ending.area() { now_path } else { &dropped };
         let original = first(path, COMPANION + BEST.len(), |path| {
-            Ok(original_free(path)? && is_alone(&area, path)? && is_free(&area, &best(path).to_path())?)
+            Ok(original_free(path)? && is_alone(folder, &area, path)? && is_free(folder, &area, &best(path).to_path())?)
         })?;
         Ok(Names { output: output.map(|_| best(&original)), original })
     }
@@ -75,7 +76,7 @@ impl Desk<'_> {
         let [report, receipt] = companions(&wanted);
         for name in [wanted.to_path(), report, receipt] {
             let (path, shown) = (out.join(&name), name.display());
-            let there = if !is_free(&out, &name).map_err(io_at(&path))? {
+            let there = if !is_free(self.folder, &out, &name).map_err(io_at(&path))? {
                 format!("out/{shown} is there already")
             } else if self.folder.alike.has_twin(&path).map_err(io_at(&path))? {
                 format!("there is a name already that other systems take for out/{shown}")
@@ -95,21 +96,21 @@ impl Desk<'_> {
     }
 }
 
-fn is_free(base: &Path, path: &Path) -> io::Result<bool> {
-    fsx::exists(&base.join(path)).map(|there| !there)
+fn is_free(folder: &Folder, base: &Path, path: &Path) -> io::Result<bool> {
+    folder.has(&base.join(path)).map(|there| !there)
 }
 
 /// Is there neither a report nor a receipt of this name?
-fn is_alone(base: &Path, path: &RelPath) -> io::Result<bool> {
+fn is_alone(folder: &Folder, base: &Path, path: &RelPath) -> io::Result<bool> {
     let [report, receipt] = companions(path);
-    Ok(is_free(base, &report)? && is_free(base, &receipt)?)
+    Ok(is_free(folder, base, &report)? && is_free(folder, base, &receipt)?)
 }
 
 /// Is there nothing of this name, of its report's and its receipt's, nor of one that other systems take for the same?
-fn is_free_for_result(alike: &Alike, out: &Path, path: &RelPath) -> io::Result<bool> {
+fn is_free_for_result(folder: &Folder, out: &Path, path: &RelPath) -> io::Result<bool> {
     let [report, receipt] = companions(path);
     for name in [path.to_path(), report, receipt] {
-        if !is_free(out, &name)? || alike.has_twin(&out.join(name))? {
+        if !is_free(folder, out, &name)? || folder.alike.has_twin(&out.join(name))? {
             return Ok(false);
         }
     }

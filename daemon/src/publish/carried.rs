@@ -22,7 +22,7 @@ impl Desk<'_> {
     /// Those of the store, and the file system's.
     pub(crate) fn intend_carried(&self, job: &Job, content: Hash, ctime_ns: i64) -> Result<Job, PublishError> {
         self.begin(job)?;
-        superseded::clear(self.folder, job);
+        superseded::clear(self.folder, job, &|| self.must_hold())?;
         crash_point("daemon.superseded");
         let publication = self.prepare_carried(job, content, Some(ctime_ns))?;
         self.intend_durably(job, publication)

@@ -86,7 +86,10 @@ fn of_history(config: &Config, now: Time, jobs: Jobs) -> Result<String, (String,
     let jobs = jobs(&first.path)?;
     let is_needed = |job: &Job| {
         let folder = config.folders.iter().find(|folder| folder.name == job.source.folder);
-        let there = |folder: &FolderConfig| fsx::exists(&folder.path.join("in").join(job.source.path.to_path())).unwrap_or(true);
+        // A bucket is not asked: then a record may stay that would go.
+        let there = |folder: &FolderConfig| {
+            folder.bucket.is_some() || fsx::exists(&folder.path.join("in").join(job.source.path.to_path())).unwrap_or(true)
+        };
         job.answers_for_source() && folder.is_none_or(there)
     };
     for past in past_of(&jobs, &config.keep, now, &is_needed) {

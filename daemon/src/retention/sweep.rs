@@ -222,6 +222,9 @@ impl Sweeper {
 
 /// Is the file gone from `in/` for which a job answers? What cannot be seen is not gone.
 pub(crate) fn is_gone(folder: &Folder, job: &Job) -> bool {
+    if let Some(shelf) = &folder.bucket {
+        return shelf.is_gone(&folder.inbox(), &folder.root, job);
+    }
     let source = &job.source;
     let found = fsx::look(&folder.inbox().join(source.path.to_path()));
     // Its disk may be another device since.

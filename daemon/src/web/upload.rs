@@ -121,7 +121,13 @@ fn folder_of(context: &Context, name: Option<&str>) -> Result<Arc<Folder>, Probl
         Some(name) => context.folders.iter().find(|folder| folder.name == name),
         None => context.folders.first().filter(|_| context.folders.len() == 1),
     };
-    found.cloned().ok_or_else(|| Problem::bad(format!("`folder` must be one of {}", names())))
+    let folder = found.cloned().ok_or_else(|| Problem::bad(format!("`folder` must be one of {}", names())))?;
+    match &folder.bucket {
+        None => Ok(folder),
+        Some(shelf) => {
+            Err(Problem::bad(format!("the folder lies in a bucket: put the file into {}/in/", shelf.bucket.address())))
+        }
+    }
 }
 
 fn key_of(headers: &HeaderMap, folder: &Folder) -> Result<Option<Key>, Problem> {

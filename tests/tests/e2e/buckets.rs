@@ -1,0 +1,338 @@
+//! A hot folder in a bucket, on a server that speaks S3 (`moto_server`, which `.ci/run` installs), behind a proxy that fails.
+
+use std::io::{Read, Write};
+use std::net::{TcpListener, TcpStream};
+use std::os::unix::process::ExitStatusExt;
+use std::process::{Child, Command, Stdio};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU8, AtomicUsize, Ordering};
+
+use suture_bench::generate::Case;
+use suture_tests::Place;
+use suture_tests::binary::with_crash_points;
+use suture_tests::hot::{doubtful, holes};
+use suture_tests::served::{Served, wait_until};
+
+/// A server of this test's own.
+struct Store {
+    child: Child,
+    port: u16,
+}
+
+impl Drop for Store {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+impl Store {
+    /// `None`, and a line: this machine has no such server.
+    fn start() -> Option<Self> {
+        let port = TcpListener::bind("127.0.0.1:0").and_then(|free| free.local_addr()).expect("a port").port();
+        let mut command = Command::new("moto_server");
+        command.args(["-H", "127.0.0.1", "-p", &port.to_string()]).stdout(Stdio::null()).stderr(Stdio::null());
+        match command.spawn() {
+            Ok(child) => {
+                let store = Self { child, port };
+                wait_until("the object store listens", || TcpStream::connect(("127.0.0.1", port)).is_ok());
+                Some(store)
+            }
+            Err(error) if std::env::var_os("CI").is_none() => {
+                println!("skipped: moto_server cannot be started: {error}");
+                None
+            }
+            Err(error) => panic!("moto_server: {error}"),
+        }
+    }
+
+    /// Asks, and returns the body of the answer.
+    fn ask(&self, method: &str, path: &str, body: &[u8]) -> Vec<u8> {
+        let mut stream = TcpStream::connect(("127.0.0.1", self.port)).expect("it listens");
+        let head = format!(
+            "{method} {path} HTTP/1.0\r\nHost: localhost\r\nAuthorization: AWS4-HMAC-SHA256 Credential=a/20260101/us-east-1/s3/aws4_request\r\n\
+             Content-Length: {}\r\n\r\n",
+            body.len()
+        );
+        stream.write_all(head.as_bytes()).and_then(|()| stream.write_all(body)).expect("it reads");
+        let mut answer = Vec::new();
+        stream.read_to_end(&mut answer).expect("it answers");
+        let at = answer.windows(4).position(|four| four == b"\r\n\r\n").expect("a head");
+        answer.split_off(at + 4)
+    }
+
+    fn keys(&self) -> Vec<String> {
+        let listed = String::from_utf8(self.ask("GET", "/prints?list-type=2", b"")).expect("text");
+        listed.split("<Key>").skip(1).filter_map(|rest| rest.split('<').next()).map(String::from).collect()
+    }
+}
+
+/// How a proxy before the store behaves.
+const HONEST: u8 = 0;
+/// Of four answers one is an error, and of eight one is cut.
+const FAILING: u8 = 1;
+/// Nothing is allowed any more.
+const REFUSING: u8 = 2;
+/// Nothing is answered.
+const DEAD: u8 = 3;
+
+/// A proxy before the store. Its port.
+fn proxy(port: u16, mood: &Arc<AtomicU8>) -> u16 {
+    let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
+    let own = listener.local_addr().expect("an address").port();
+    let (count, mood) = (AtomicUsize::new(0), Arc::clone(mood));
+    std::thread::spawn(move || {
+        for near in listener.incoming().flatten() {
+            let (n, mood) = (count.fetch_add(1, Ordering::Relaxed), mood.load(Ordering::SeqCst));
+            std::thread::spawn(move || relay(near, port, n, mood));
+        }
+    });
+    own
+}
+
+/// The server ends each connection with its answer, so that one connection is one call.
+fn relay(mut near: TcpStream, port: u16, n: usize, mood: u8) {
+    if mood == DEAD {
+        return;
+    }
+    let Ok(mut far) = TcpStream::connect(("127.0.0.1", port)) else { return };
+    let (Ok(mut from), Ok(mut to)) = (near.try_clone(), far.try_clone()) else { return };
+    if mood == HONEST || mood == FAILING {
+        std::thread::spawn(move || std::io::copy(&mut from, &mut to));
+    } else {
+        // The head of the request is read, or the answer would be lost with the connection.
+        let _ = from.read(&mut [0; 4096]);
+        let body = "<Error><Code>AccessDenied</Code><AWSAccessKeyId>a-key</AWSAccessKeyId></Error>";
+        let head = format!("HTTP/1.1 403 Forbidden\r\nContent-Length: {}\r\nConnection: close\r\n\r\n", body.len());
+        let _ = near.write_all(head.as_bytes()).and_then(|()| near.write_all(body.as_bytes()));
+        let _ = near.shutdown(std::net::Shutdown::Write);
+        return;
+    }
+    let mut answer = Vec::new();
+    let _ = far.read_to_end(&mut answer);
+    match n % 4 {
+        _ if mood == HONEST => {}
+        // Done, and not told.
+        1 => answer = b"HTTP/1.1 500 Oops\r\nContent-Length: 0\r\nConnection: close\r\n\r\n".to_vec(),
+        3 if n % 8 == 3 => answer.truncate(answer.len() - answer.len().min(20)),
+        _ => {}
+    }
+    let _ = near.write_all(&answer);
+    let _ = near.shutdown(std::net::Shutdown::Both);
+    let _ = far.shutdown(std::net::Shutdown::Both);
+}
+
+fn watch(place: &Place, port: u16) -> Command {
+    let mut command = serve(place, port);
+    command.arg("--once");
+    command
+}
+
+fn serve(place: &Place, port: u16) -> Command {
+    let mut command = on(place.command(), port);
+    command.args(["watch", "--config", "suture.toml"]);
+    command
+}
+
+/// Has it use that store.
+fn on(mut command: Command, port: u16) -> Command {
+    command.env("AWS_ENDPOINT", format!("http://127.0.0.1:{port}")).env("AWS_ALLOW_HTTP", "true").env("AWS_REGION", "us-east-1");
+    command.env("AWS_ACCESS_KEY_ID", "a-key").env("AWS_SECRET_ACCESS_KEY", "a-secret");
+    command
+}
+
+fn configured(bucket: &str) -> Place {
+    let place = Place::new();
+    place.put(
+        "suture.toml",
+        format!("state = \"state\"\nrescan = \"1s\"\n[[folders]]\npath = \"s3://{bucket}\"\nname = \"farm\"\n").as_bytes(),
+    );
+    place
+}
+
+/// Each drop has one result, the bytes are those of a folder, and originals are whole, whatever the way to the store loses.
+#[test]
+fn a_bucket_gets_the_results_that_a_folder_gets() {
+    let Some(store) = Store::start() else { return };
+    let place = configured("prints/farm");
+    store.ask("PUT", "/prints", b"");
+    for n in 1..=4 {
+        store.ask("PUT", &format!("/prints/farm/in/{n}.stl"), &holes(n));
+        place.put(&format!("local/in/{n}.stl"), &holes(n));
+    }
+    store.ask("PUT", "/prints/farm/in/bad.stl", b"no mesh");
+    place.suture(["watch", "local", "--once", "--settle", "10ms"]).expect(0);
+    for port in [proxy(store.port, &Arc::new(AtomicU8::new(FAILING))), store.port] {
+        let ran = watch(&place, port).output().expect("it runs");
+        let said = String::from_utf8_lossy(&ran.stderr).into_owned();
+        assert!(!said.contains("a-secret") && !said.contains("a-key"), "{said}");
+        assert!(!said.contains("without regard to conditions"), "this server knows them: {said}");
+    }
+    let mut wanted: Vec<String> =
+        ["bad.stl", "bad.stl.report.json", "bad.stl.suture.json"].map(|name| format!("farm/failed/{name}")).into();
+    for n in 1..=4 {
+        wanted.push(format!("farm/done/{n}.stl"));
+        wanted.extend(["", ".report.json", ".suture.json"].map(|end| format!("farm/out/{n}.stl{end}")));
+        assert!(store.ask("GET", &format!("/prints/farm/done/{n}.stl"), b"") == holes(n), "the original of {n}");
+        assert!(
+            store.ask("GET", &format!("/prints/farm/out/{n}.stl"), b"") == place.read(&format!("local/out/{n}.stl")),
+            "the result of {n}"
+        );
+    }
+    wanted.sort();
+    let mut keys = store.keys();
+    // A daemon whose removal of it failed leaves that for a day.
+    keys.retain(|key| !key.starts_with("farm/.suture/probe-"));
+    assert_eq!(keys, wanted);
+}
+
+/// The one line that a daemon says which does not begin.
+fn refused(mut command: Command) -> String {
+    let ran = command.output().expect("it runs");
+    let said = String::from_utf8_lossy(&ran.stderr).into_owned();
+    assert_eq!((ran.status.code(), said.lines().count()), (Some(2), 1), "{said}");
+    assert!(!said.contains("a-secret") && !said.contains("a-key"), "{said}");
+    said
+}
+
+#[test]
+fn a_bucket_that_is_not_there_or_not_ours_is_one_line() {
+    let Some(store) = Store::start() else { return };
+    let said = refused(watch(&configured("nowhere/farm"), store.port));
+    assert!(said.contains("s3://nowhere/farm: there is no such bucket; see to its name"), "{said}");
+    store.ask("PUT", "/prints", b"");
+    let place = configured("prints/farm");
+    let said = refused(watch(&place, proxy(store.port, &Arc::new(AtomicU8::new(REFUSING)))));
+    assert!(said.contains("s3://prints/farm") && said.contains("AccessDenied"), "{said}");
+    let mut command = watch(&place, store.port);
+    command.env_remove("AWS_ACCESS_KEY_ID").env("AWS_PROFILE", "farm");
+    let said = refused(command);
+    assert!(said.contains("profiles are not read"), "{said}");
+    let mut command = on(place.command(), store.port);
+    command.args(["watch", "s3://prints/farm"]);
+    let said = refused(command);
+    assert!(said.contains("--config") && !place.at("s3:").exists(), "{said}");
+    assert_eq!(store.keys(), [""; 0], "nothing was written");
+}
+
+/// While the store refuses, or is not there, jobs wait; each outage is said once, and so is its end.
+#[test]
+fn an_outage_is_waited_out_and_said_once() {
+    let Some(store) = Store::start() else { return };
+    store.ask("PUT", "/prints", b"");
+    let (place, mood) = (configured("prints/farm"), Arc::new(AtomicU8::new(DEAD)));
+    let ran = watch(&place, proxy(store.port, &mood)).output().expect("it runs");
+    assert!(!ran.status.success(), "nothing was looked at: {}", String::from_utf8_lossy(&ran.stderr));
+    mood.store(HONEST, Ordering::SeqCst);
+    let served = Served::of(&place, serve(&place, proxy(store.port, &mood)), "log");
+    let listed = || place.suture(["jobs", "list", "--dir", "state/buckets/farm"]).expect(0).stdout();
+    for (n, trouble) in [(1, REFUSING), (2, DEAD)] {
+        let is_there = |name: String| move |store: &Store| store.keys().contains(&name);
+        let arrived = is_there(format!("farm/done/{n}.stl"));
+        mood.store(trouble, Ordering::SeqCst);
+        wait_until("the outage is said", || served.lines("The folder cannot be served for now.").len() == n);
+        store.ask("PUT", &format!("/prints/farm/in/{n}.stl"), &holes(n as u64));
+        let list = listed();
+        assert!(list.contains("out of reach: s3://prints/farm: "), "{list}");
+        // Some looks go by.
+        std::thread::sleep(std::time::Duration::from_secs(5));
+        assert!(!arrived(&store), "nobody could have put it there");
+        mood.store(HONEST, Ordering::SeqCst);
+        wait_until("the drop is done", || arrived(&store));
+        assert_eq!(served.lines("The folder cannot be served for now.").len(), n, "once");
+        assert_eq!(served.lines("The folder is back.").len(), n);
+        assert!(!listed().contains("out of reach"), "{}", listed());
+    }
+    assert!(store.keys().iter().all(|key| !key.starts_with("farm/failed/") && !key.starts_with("farm/quarantine/")));
+}
+
+/// Where versions are kept, an original goes as the very version that was copied; an earlier drop, which it had replaced, is no drop again. At the root of a
+/// bucket all is as below a prefix.
+#[test]
+fn a_version_is_removed_and_no_other() {
+    let Some(store) = Store::start() else { return };
+    store.ask("PUT", "/prints", b"");
+    store.ask("PUT", "/prints?versioning", b"<VersioningConfiguration><Status>Enabled</Status></VersioningConfiguration>");
+    store.ask("PUT", "/prints/in/a.stl", b"an earlier drop of the name");
+    // The store tells times in seconds.
+    std::thread::sleep(std::time::Duration::from_millis(1100));
+    store.ask("PUT", "/prints/in/a.stl", &holes(1));
+    let place = configured("prints");
+    for _ in 0..2 {
+        let ran = watch(&place, store.port).output().expect("it runs");
+        assert!(ran.status.success(), "{}", String::from_utf8_lossy(&ran.stderr));
+    }
+    assert_eq!(store.keys(), ["done/a.stl", "out/a.stl", "out/a.stl.report.json", "out/a.stl.suture.json"]);
+    assert!(store.ask("GET", "/prints/done/a.stl", b"") == holes(1));
+    let versions = String::from_utf8(store.ask("GET", "/prints?versions&prefix=in/", b"")).expect("text");
+    assert_eq!((versions.matches("<Version>").count(), versions.matches("<DeleteMarker>").count()), (1, 1), "{versions}");
+    let of_its_own = String::from_utf8(store.ask("GET", "/prints?versions&prefix=.suture/", b"")).expect("text");
+    assert!(!of_its_own.contains("<Version>") && !of_its_own.contains("<DeleteMarker>"), "{of_its_own}");
+}
+
+/// A person approves a result as in a folder: the bytes that were judged are published, and nothing stays of it in `failed/`.
+#[test]
+fn what_is_approved_is_published_in_the_bucket() {
+    let Some(store) = Store::start() else { return };
+    store.ask("PUT", "/prints", b"");
+    store.ask("PUT", "/prints/farm/in/part.stl", &doubtful());
+    let place = configured("prints/farm");
+    let _served = Served::of(&place, serve(&place, store.port), "log");
+    wait_until("it needs review", || store.keys().contains(&"farm/failed/part.stl".into()));
+    let best = store.ask("GET", "/prints/farm/failed/part.best.stl", b"");
+    let approve = || place.suture(["jobs", "approve", "1", "--as", "Ada", "--dir", "state/buckets/farm"]);
+    wait_until("the job is at its end", || approve().code() == 0);
+    let wanted = ["done/part.stl", "out/part.stl", "out/part.stl.report.json", "out/part.stl.suture.json"];
+    wait_until("it is published", || store.keys() == wanted.map(|key| format!("farm/{key}")));
+    assert!(store.ask("GET", "/prints/farm/out/part.stl", b"") == best);
+    assert!(store.ask("GET", "/prints/farm/done/part.stl", b"") == doubtful());
+}
+
+/// Killed at each point of its way in turn, and begun again: one result, the original whole, nothing else.
+#[test]
+fn killed_at_each_point_it_leaves_one_result() {
+    let Some(store) = Store::start() else { return };
+    store.ask("PUT", "/prints", b"");
+    let mut killed = 0;
+    for pass in 1.. {
+        let place = configured(&format!("prints/{pass}"));
+        store.ask("PUT", &format!("/prints/{pass}/in/a.stl"), &holes(1));
+        let status = on(place.command_of(with_crash_points()), store.port)
+            .args(["watch", "--config", "suture.toml", "--once"])
+            .env("SUTURE_CRASH_AT", format!("*:{pass}"))
+            .status()
+            .expect("it runs");
+        let ran = watch(&place, store.port).output().expect("it runs");
+        assert!(ran.status.success(), "{pass}: {}", String::from_utf8_lossy(&ran.stderr));
+        let names = ["done/a.stl", "out/a.stl", "out/a.stl.report.json", "out/a.stl.suture.json"];
+        let keys = store.keys().into_iter().filter(|key| key.starts_with(&format!("{pass}/"))).collect::<Vec<_>>();
+        assert_eq!(keys, names.map(|name| format!("{pass}/{name}")), "{pass}");
+        assert!(store.ask("GET", &format!("/prints/{pass}/done/a.stl"), b"") == holes(1), "{pass}");
+        if status.success() {
+            break;
+        }
+        assert_eq!(status.signal(), Some(9), "{pass}");
+        killed += 1;
+    }
+    assert!(killed >= 10, "only {killed} points");
+}
+
+/// A result that is larger than one call goes up in parts, and nobody sees it before it is whole.
+#[test]
+fn a_large_result_goes_up_in_parts() {
+    let Some(store) = Store::start() else { return };
+    store.ask("PUT", "/prints", b"");
+    let place = configured("prints/farm");
+    let (drop, _) = place.generate(Case::Clean, 400_000, 1);
+    let drop = std::fs::read(drop).expect("it was written");
+    assert!(drop.len() > 16 << 20, "{} bytes are one part", drop.len());
+    store.ask("PUT", "/prints/farm/in/large.stl", &drop);
+    let ran = watch(&place, store.port).output().expect("it runs");
+    assert!(ran.status.success(), "{}", String::from_utf8_lossy(&ran.stderr));
+    assert!(store.ask("GET", "/prints/farm/done/large.stl", b"") == drop);
+    let receipt = store.ask("GET", "/prints/farm/out/large.stl.suture.json", b"");
+    let receipt: serde_json::Value = serde_json::from_slice(&receipt).expect("JSON");
+    let result = store.ask("GET", "/prints/farm/out/large.stl", b"");
+    assert!(result.len() > 16 << 20);
+    assert_eq!(receipt["output_blake3"], blake3::hash(&result).to_hex().as_str());
+}

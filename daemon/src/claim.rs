@@ -131,8 +131,7 @@ pub(crate) fn claim(folder: &Folder, job: &Job, work: &Path, free: u64) -> Resul
     let original = open(&folder.area(area).join(path.to_path()))?;
     let before = look(&original, job)?;
     has_room(before.size.saturating_mul(3), free)?;
-    // A new folder: what is in it, this attempt has put there.
-    make_parent(work).and_then(|()| std::fs::create_dir(work)).map_err(failed("the work folder cannot be made"))?;
+    make_work(work)?;
     take(original, job, &work.join(CLAIMED))
 }
 
@@ -143,6 +142,11 @@ fn has_room(needed: u64, free: u64) -> Result<(), Unclaimed> {
         return Err(Unclaimed::Shortage(format!("the disk has room for {free} more; this file may need {needed}")));
     }
     Ok(())
+}
+
+/// Makes a new folder: what is in it, this attempt has put there.
+fn make_work(work: &Path) -> Result<(), Unclaimed> {
+    make_parent(work).and_then(|()| std::fs::create_dir(work)).map_err(failed("the work folder cannot be made"))
 }
 
 /// Has the job's original, from its bucket, in `work`, which is made: the very version that the job is of.
@@ -163,7 +167,7 @@ fn fetch(folder: &Folder, shelf: &Shelf, job: &Job, work: &Path, free: u64) -> R
     }
     // One more for the drop itself.
     has_room(found.version.size.saturating_mul(4), free)?;
-    make_parent(work).and_then(|()| std::fs::create_dir(work)).map_err(failed("the work folder cannot be made"))?;
+    make_work(work)?;
     let claimed = work.join(CLAIMED);
     shelf.cache.give(&shelf.bucket, &key, &found.version, &claimed).map_err(away)?;
     let original = open(&claimed)?;

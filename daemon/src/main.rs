@@ -24,6 +24,7 @@ mod curves;
 mod deliver;
 mod demo;
 mod draft;
+mod escape;
 mod event;
 mod event_bus;
 mod event_metrics;

@@ -12,10 +12,13 @@ pub(crate) const MOST: usize = 48;
 /// Fewer vertices make no range of their own.
 const LEAST: usize = 1 << 14;
 
+/// Ranges, at most: all corners are looked at for each.
+const MOST_RANGES: usize = 8;
+
 /// The corners at each vertex, 3f + k for corner k of face f, ascending, from where to where. O(n), on the threads of the pool that this one belongs to:
 /// each has a range of vertices.
 pub(crate) fn corners_by_vertex(vertices: usize, faces: &[[u32; 3]]) -> (Vec<u32>, Vec<u32>) {
-    let size = vertices.div_ceil(rayon::current_num_threads()).max(LEAST);
+    let size = vertices.div_ceil(rayon::current_num_threads().min(MOST_RANGES)).max(LEAST);
     let mut starts = vec![0_u32; vertices + 1];
     starts[1..].par_chunks_mut(size).enumerate().for_each(|(range, counts)| {
         let first = range * size;

@@ -68,9 +68,7 @@ impl Mesh {
     /// # Errors
     /// [`MeshError::TooManyFaces`], [`MeshError::TooManyVertices`].
     pub fn from_triangles(triangles: &[[[f32; 3]; 3]]) -> Result<Self, MeshError> {
-        if triangles.len() as u64 > MAX_TRIANGLES {
-            return Err(MeshError::TooManyFaces { faces: triangles.len() });
-        }
+        are_few_enough(triangles.len())?;
         Self::of_welded(shared_vertices::alone(triangles, |triangle| *triangle))
     }
 
@@ -79,9 +77,7 @@ impl Mesh {
     /// # Errors
     /// As those of [`Self::from_triangles`].
     pub(crate) fn of_records(records: &[Record]) -> Result<Self, MeshError> {
-        if records.len() as u64 > MAX_TRIANGLES {
-            return Err(MeshError::TooManyFaces { faces: records.len() });
-        }
+        are_few_enough(records.len())?;
         Self::of_welded(shared_vertices::together(records, record::corners))
     }
 
@@ -116,6 +112,11 @@ impl Mesh {
     }
 }
 
+/// Can numbers tell so many faces apart?
+fn are_few_enough(faces: usize) -> Result<(), MeshError> {
+    if faces as u64 > MAX_TRIANGLES { Err(MeshError::TooManyFaces { faces }) } else { Ok(()) }
+}
+
 impl<'m> From<&'m Mesh> for MeshView<'m> {
     fn from(mesh: &'m Mesh) -> Self {
         mesh.view()
@@ -131,9 +132,7 @@ impl<'m> MeshView<'m> {
         if u32::try_from(vertices.len()).is_err() {
             return Err(MeshError::TooManyVertices { vertices: vertices.len() });
         }
-        if faces.len() as u64 > MAX_TRIANGLES {
-            return Err(MeshError::TooManyFaces { faces: faces.len() });
-        }
+        are_few_enough(faces.len())?;
         // Branch-free first; the culprit is looked for only if there is one.
         let largest = faces.as_flattened().iter().copied().max().unwrap_or(0);
         if largest as usize >= vertices.len()

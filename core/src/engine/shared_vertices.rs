@@ -108,13 +108,9 @@ fn joined(parts: Vec<Part>, size: usize, mut faces: Vec<[u32; 3]>) -> Result<Wel
 
 /// The numbers of the vertices of each part, by its own numbers; none for the first part, whose numbers stay.
 fn numbers(parts: &[Part]) -> Result<Vec<Vec<u32>>, usize> {
-    let mut numbers: Vec<Vec<u32>> = Vec::with_capacity(parts.len());
+    let mut numbers: Vec<Vec<u32>> = vec![Vec::new()];
     let mut count = parts.first().map_or(0, |part| part.weld.positions().len());
-    for (i, part) in parts.iter().enumerate() {
-        if i == 0 {
-            numbers.push(Vec::new());
-            continue;
-        }
+    for (i, part) in parts.iter().enumerate().skip(1) {
         let blocks = part.weld.positions().par_chunks(BATCH).with_min_len(BLOCK / BATCH);
         let mut own: Vec<u32> = blocks.flat_map_iter(|points| known(&parts[..i], &numbers, points)).collect();
         for number in own.iter_mut().filter(|number| **number == NONE) {

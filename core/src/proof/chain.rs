@@ -79,7 +79,7 @@ pub(super) fn over(surface: &Surface<'_>, [a, b]: [&Pair; 2], aim: f64) -> Optio
 }
 
 /// Appends what is between two ends where the way straight on, from face to face, leads over edges as near as is aimed at; else nothing, and false.
-/// Most ways are such, and this one costs a tenth of the search for the best one.
+/// Most ways are such, and of each face one edge is looked at, where the search for the best way looks at all.
 fn straight(surface: &Surface<'_>, [a, b]: [&Pair; 2], aim: f64, lent: &mut Lent, out: &mut Vec<Pair>) -> bool {
     let start = out.len();
     let ahead = b.place - a.place;
@@ -145,22 +145,19 @@ fn search(surface: &Surface<'_>, [a, b]: [&Pair; 2], aim: f64, lent: &mut Lent) 
         reached[at].is_done = true;
         for k in 0..3 {
             let Some(face) = surface.beyond(now.face, k) else { continue };
+            let known = reached.iter().position(|r| r.face == face);
             // No way is better than the one to a face that is done, or over edges that are all near.
-            if reached.iter().any(|r| r.face == face && (r.is_done || r.cost[0] <= aim)) {
+            let is_settled = |i: usize| reached[i].is_done || reached[i].cost[0] <= aim;
+            if known.map_or(reached.len() >= MOST, is_settled) {
                 continue;
             }
             let pair = cross(surface, (now.face, k), a.place, b.place);
             let cost = [now.cost[0].max(pair.off), pair.place.distance_squared(b.place)];
-            let room = reached.len() < MOST;
-            match reached.iter_mut().find(|r| r.face == face) {
-                Some(known) if known.cost[0] > cost[0] && !known.is_done => {
-                    (known.before, known.corner, known.cost) = (at, k, cost);
-                }
+            let way = Reached { face, before: at, corner: k, cost, is_done: false };
+            match known {
+                Some(i) if reached[i].cost[0] > cost[0] => reached[i] = way,
                 Some(_) => {}
-                None if room => {
-                    reached.push(Reached { face, before: at, corner: k, cost, is_done: false });
-                }
-                None => {}
+                None => reached.push(way),
             }
         }
     }

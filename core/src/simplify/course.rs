@@ -24,8 +24,8 @@ const LIMIT: f64 = 0.2;
 const STRICTER: f64 = 0.25;
 
 /// Rounds, at most: the share of vertices below each plane that parts cells, and the margin of the count. The first one leaves a margin, so that what
-/// cells share is not left fine for good; the second one leaves what they share then, and the third one leaves as many in all as are wanted. Later ones
-/// are for what may not be done sooner.
+/// cells share is not left fine for good; the second one is without, and after the third one as many are left in all as are wanted, whatever cells share
+/// then. Later ones are for collapses that were not allowed sooner.
 const ROUNDS: [(f64, f64); 6] = [(0.5, 1.4), (0.41, 1.0), (0.56, 0.0), (0.46, 0.0), (0.61, 0.0), (0.38, 0.0)];
 
 /// So many of them where no count is wanted: one for all, two for what cells share.

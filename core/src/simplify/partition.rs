@@ -121,15 +121,17 @@ fn plane(points: &[Point], order: &mut [u32], planes: Planes) -> Option<(usize, 
         some.sort_unstable_by(f32::total_cmp);
         let rank = (some.len() as f64 * planes.below) as usize;
         let middle = some.get(rank).copied().unwrap_or(bounds.lo[axis]);
-        let count = partition_in_place(order, |v| along(v) < middle);
-        if count > 0 && count < order.len() {
-            return Some((axis, middle, count));
+        let part_at = |order: &mut [u32], at: f32| {
+            let count = partition_in_place(order, |v| along(v) < at);
+            (count > 0 && count < order.len()).then_some((axis, at, count))
+        };
+        if let Some(plane) = part_at(order, middle) {
+            return Some(plane);
         }
         // Where many are at the plane, the next one above it parts as well.
         let next = order.iter().map(along).filter(|x| *x > middle).fold(f32::INFINITY, f32::min);
-        let count = partition_in_place(order, |v| along(v) < next);
-        if count > 0 && count < order.len() {
-            return Some((axis, next, count));
+        if let Some(plane) = part_at(order, next) {
+            return Some(plane);
         }
     }
     None

@@ -17,6 +17,7 @@ use object_store::{Attributes, Error, MultipartId, PutMultipartOptions, Result};
 use super::listing;
 use super::object::{OWNER, Version};
 use super::requests::{Page, Requests, Upload};
+use crate::escape::escaped;
 
 /// An address with a signature serves no longer.
 const SIGNED_FOR: Duration = Duration::from_secs(300);
@@ -136,24 +137,15 @@ fn refused(status: StatusCode, key: &Key, body: &[u8]) -> Error {
         StatusCode::PRECONDITION_FAILED => Error::Precondition { path, source },
         StatusCode::UNAUTHORIZED => Error::Unauthenticated { path, source },
         StatusCode::FORBIDDEN => Error::PermissionDenied { path, source },
-        // Such an answer may come with a success, too.
+        // S3 says so within a success, too.
         _ if text.contains("<Code>PreconditionFailed</Code>") => Error::Precondition { path, source },
         _ => Error::Generic { store: "S3", source },
     }
 }
 
-/// As in an address, `/` excepted.
-fn encoded(text: &str) -> String {
-    let mut out = String::with_capacity(text.len());
-    for byte in text.bytes() {
-        match byte {
-            b'a'..=b'z' | b'A'..=b'Z' | b'0'..=b'9' | b'-' | b'.' | b'_' | b'~' | b'/' => out.push(byte.into()),
-            _ => {
-                let _ = write!(out, "%{byte:02X}");
-            }
-        }
-    }
-    out
+/// A key as an address has it: its parts, between `/`.
+fn encoded(key: &str) -> String {
+    key.split('/').map(escaped).collect::<Vec<_>>().join("/")
 }
 
 #[cfg(test)]

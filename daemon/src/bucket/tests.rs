@@ -118,7 +118,7 @@ fn the_cache_is_bounded() {
     // Fifteen bytes that are in no use but for `a` do not fit into ten.
     assert_eq!(["a", "b", "c", "d"].map(here), [true, false, true, true]);
     assert_eq!(std::fs::read(work("a")).unwrap(), b"a2345");
-    // What is larger than all of them may be is not kept at all, and pushes nothing out.
+    // A drop that is larger than the whole cache may be is not kept, and pushes nothing out.
     std::fs::write(work("drop"), "eleven byte").unwrap();
     bucket.put_new(&work("drop"), "e", "x", ANYWAY).unwrap();
     cache.give(&bucket, "e", &version("e"), &work("e")).unwrap();

@@ -1,4 +1,4 @@
-//! What a folder is, and whose.
+//! A folder is told by its names, its parts and its owner.
 
 use super::*;
 

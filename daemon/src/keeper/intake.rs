@@ -46,8 +46,7 @@ pub(crate) fn tend(folder: &Folder, context: &Context, ended: &dyn Fn() -> bool)
             looked = Some(context.world.steady());
             let why = match found {
                 Ok(()) => None,
-                Err(NoAnswer::Store(error)) => return Err(error),
-                Err(NoAnswer::Bucket(Trouble::Store(error))) => return Err(error),
+                Err(NoAnswer::Store(error) | NoAnswer::Bucket(Trouble::Store(error))) => return Err(error),
                 Err(NoAnswer::Bucket(trouble)) => Some(trouble.to_string()),
             };
             intake.tell(why.as_deref(), is_away)?;

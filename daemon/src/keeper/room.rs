@@ -30,9 +30,8 @@ impl Keeper {
             Answer::Silent => false,
         };
         let folders: Vec<_> = self.folders.iter().map(|kept| &kept.folder).filter(is_full).collect();
-        let all_are_full = !folders.is_empty()
-            && self.context.folders.iter().all(|folder| folder.bucket.is_none())
-            && folders.len() == self.folders.len();
+        // A folder in a bucket is never among the full ones.
+        let all_are_full = folders.len() == context.folders.len();
         context.schedule.hold(Hold::Disk, folders.first().filter(|_| all_are_full).map(|folder| folder.nearly_full()));
         let full: BTreeSet<String> = folders.iter().map(|folder| folder.name.clone()).collect();
         let mut known = context.full.lock().unwrap_or_else(PoisonError::into_inner);

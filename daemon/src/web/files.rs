@@ -18,6 +18,7 @@ use tokio::task::spawn_blocking;
 
 use crate::attempt::Context;
 use crate::create;
+use crate::escape::escaped;
 use crate::folder::Folder;
 use crate::fsx::Identity;
 use crate::left::{report_path, result_path};
@@ -188,12 +189,6 @@ fn look(file: &File) -> io::Result<Identity> {
     Ok(Identity::from(&file.metadata()?))
 }
 
-/// A name as a header or an address may hold it.
-pub(super) fn escaped(name: &str) -> String {
-    let plain = |byte: u8| byte.is_ascii_alphanumeric() || b"-._~".contains(&byte);
-    name.bytes().map(|byte| if plain(byte) { char::from(byte).to_string() } else { format!("%{byte:02X}") }).collect()
-}
-
 /// Of all bytes, a few at a time, so that no large file keeps others waiting.
 async fn hash(opened: &Opened) -> io::Result<Hash> {
     let (mut hasher, mut at) = (blake3::Hasher::new(), 0);
@@ -252,14 +247,4 @@ async fn feed(opened: &Opened, sender: &Sender<io::Result<Bytes>>) -> io::Result
         }
     }
     Ok(())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn names_fit_a_header() {
-        assert_eq!(escaped("a b\"\r\nü.stl"), "a%20b%22%0D%0A%C3%BC.stl");
-    }
 }

@@ -10,12 +10,12 @@ use maud::{Markup, html};
 use suture_store::{Job, JobId, Kind};
 
 use super::frame::Frame;
+use crate::escape::escaped;
 use crate::html::words::{mark, prose, time};
 use crate::say::plain;
 use crate::shown::reason;
 use crate::units::show_count;
 use crate::web::ask::ask;
-use crate::web::files::escaped;
 use crate::web::jobs::{Wanted, page_of, parameters};
 use crate::web::problem::Problem;
 use crate::web::shared::Shared;

@@ -14,7 +14,7 @@ use tokio::time::sleep;
 
 use super::actions::{check_word, form as fields, see};
 use super::frame;
-use crate::web::files::escaped;
+use crate::escape::escaped;
 use crate::web::jobs::parameters;
 use crate::web::problem::Problem;
 use crate::web::shared::Shared;

@@ -36,7 +36,7 @@ pub(crate) fn account(said: &Said<'_>, planned: Option<&Planned<'_>>, triangles:
 pub(crate) fn words_account(mesh: &MeshFile, edit: &Edit, profile: &Profile) -> Option<Account> {
     let records = mesh.records();
     let has_word = |record: &Record| record::attribute(record) != 0;
-    let gone: Vec<u32> = edit.deleted_records().filter(|t| records.get(*t as usize).is_some_and(has_word)).collect();
+    let gone = edit.deleted_where(|t| records.get(t as usize).is_some_and(has_word));
     let new: Vec<FaceOrigin> = edit.added_with_origins().filter(|(record, _)| has_word(record)).map(|(_, from)| from).collect();
     // Nearly all files have no word but 0.
     if gone.is_empty() && new.is_empty() && profile.attributes == KeepAttributes::Best {

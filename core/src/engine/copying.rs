@@ -11,9 +11,12 @@ use crate::output::emit::{self, Content};
 
 /// Copies the file `input` to the new file `output`, and opens the copy.
 pub(crate) fn copy(input: &Path, output: &Path, limits: &Limits, progress: &dyn Progress) -> Result<MeshFile> {
-    let mesh = files::open(input, limits, progress)?;
-    let (written, _) = emit::draft(&mesh, output, limits, progress, |draft| draft.finish(&Content::Input))?;
-    written.durable()?;
+    copy_open(&files::open(input, limits, progress)?, output, limits, progress)
+}
+
+/// Copies the file of a mesh to the new file `output`, and opens the copy.
+pub(crate) fn copy_open(mesh: &MeshFile, output: &Path, limits: &Limits, progress: &dyn Progress) -> Result<MeshFile> {
+    emit::write(mesh, output, &Content::Input, limits, progress)?.durable()?;
     mesh.check_unchanged()?;
     files::open(output, limits, progress)
 }

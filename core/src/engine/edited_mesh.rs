@@ -72,7 +72,7 @@ impl EditedMesh {
                     origins.push(from);
                     at += 1;
                 }
-                Step::Deleted(_) => at += 1,
+                Step::Deleted(places) => at += places.len(),
                 Step::Added(record, from) => {
                     layout.fresh.push((faces.len(), *record));
                     faces.push(numbers.of_corners(record::corners(record)));

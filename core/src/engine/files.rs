@@ -27,7 +27,7 @@ use crate::io::read_ahead::Guide;
 use crate::io::record::Record;
 use crate::output::edit::Edit;
 use crate::output::emit;
-use crate::output::emit::{Content, Draft};
+use crate::output::emit::{Ahead, Content, Draft};
 use crate::output::incremental;
 use crate::output::readback::Expectation;
 use crate::repairs::{self, Steps};
@@ -71,29 +71,43 @@ pub(crate) struct Made {
     pub(crate) mesh: MeshFile,
     /// Of its records.
     pub(crate) edit: Edit,
+    /// Nothing was written: the file of the mesh is its own result.
+    pub(crate) stays: bool,
 }
 
-/// Makes `mesh` the new STL `output`, or a copy of its file where that is good and of the output's format.
+/// What becomes of a mesh that is good as it came.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Good {
+    /// Its file is not of the output's format: its triangles are written.
+    IsWritten,
+    /// Its file is copied.
+    IsCopied,
+    /// Nothing is written: more is to be done to it.
+    Stays,
+}
+
+/// Makes `mesh` the new STL `output`; `good`: or what else, where it is good.
 pub(crate) fn make(
     mesh: MeshFile,
     output: &Path,
-    is_of_target: bool,
+    good: Good,
     (profile, limits): (&Profile, &Limits),
     progress: &dyn Progress,
     clock: &mut Clock,
 ) -> Result<Made> {
     if !profile.repair {
-        let report = pass_on(&mesh, output, is_of_target, (profile, limits), progress, clock)?;
-        return Ok(Made { report, mesh, edit: Edit::default() });
+        let report = pass_on(&mesh, output, good != Good::IsWritten, (profile, limits), progress, clock)?;
+        return Ok(Made { report, mesh, edit: Edit::default(), stays: false });
     }
     let (mesh, welded) = welding::in_the_stream(mesh, profile, limits, progress)?;
     clock.stage("read");
     check_space(&mesh, output, limits)?;
-    let (report, edit) = emit::draft(&mesh, output, limits, progress, |draft| {
-        let mended = mend(draft, (&mesh, welded.as_ref()), (output, is_of_target), profile, limits, progress, clock);
+    let ahead = if good == Good::Stays { Ahead::Nothing } else { Ahead::All };
+    let (report, edit, stays) = emit::draft(&mesh, (output, ahead), limits, progress, |draft| {
+        let mended = mend(draft, (&mesh, welded.as_ref()), (output, good), profile, limits, progress, clock);
         mended.map_err(|error| or_changed(error, &mesh, progress))
     })?;
-    Ok(Made { report, mesh, edit })
+    Ok(Made { report, mesh, edit, stays })
 }
 
 /// Is there room for the output of `mesh`, and for what is spooled?
@@ -152,7 +166,7 @@ fn copy(
 ) -> Result<()> {
     let edit = Edit::default();
     let content = if is_of_target { Content::Input } else { Content::Edited(&edit) };
-    let (written, digest) = emit::draft(mesh, output, limits, progress, |draft| draft.finish(&content))?;
+    let (written, digest) = emit::draft(mesh, (output, Ahead::All), limits, progress, |draft| draft.finish(&content))?;
     report.input.blake3 = digest::hash(mesh.bytes(), &digest);
     clock.stage("emit");
     report.edit = edit.summary(mesh.records().len());
@@ -173,12 +187,12 @@ fn copy(
 fn mend(
     draft: Draft<'_, '_>,
     (mesh, welded): (&MeshFile, Option<&Counts>),
-    (output, is_of_target): (&Path, bool),
+    (output, good): (&Path, Good),
     profile: &Profile,
     limits: &Limits,
     progress: &dyn Progress,
     clock: &mut Clock,
-) -> Result<(Report, Edit)> {
+) -> Result<(Report, Edit, bool)> {
     let (survey, set_right) = everywhere::survey(mesh, profile, limits, progress)?;
     let mut diagnosis = everywhere::diagnose((survey, set_right.as_ref()), mesh, profile, limits, progress)?;
     clock.stage("topology");
@@ -197,8 +211,9 @@ fn mend(
         None => edit,
     };
     let survey = Some(survey).filter(|_| set_right.is_none());
-    let mended = Mended { edit, evidence, surface, may_be_copied: welded.is_none() && is_of_target };
-    let written = write(draft, mesh, &mended, survey, &mut report, (output, limits, progress), clock)?;
+    let good = if welded.is_none() { good } else { Good::IsWritten };
+    let mended = Mended { edit, evidence, surface, good };
+    let (written, stays) = write(draft, mesh, &mended, survey, &mut report, (output, limits, progress), clock)?;
     judging::advise(&mut report, &mended.evidence);
     if let Some(counts) = welded {
         welding::tell(&mut report, counts, (mesh, &mended.edit));
@@ -209,7 +224,7 @@ fn mend(
     written.durable()?;
     clock.stage("verify");
     mesh.check_unchanged()?;
-    Ok((report, mended.edit))
+    Ok((report, mended.edit, stays))
 }
 
 /// What the repairs come to.
@@ -218,27 +233,32 @@ struct Mended {
     evidence: Evidence,
     /// The box of the input's surface.
     surface: Bounds,
-    /// The records are those of the file, which is of the output's format.
-    may_be_copied: bool,
+    /// If there is nothing to repair.
+    good: Good,
 }
 
-/// Makes `draft` what the edit says, and judges it. `survey`: of the records that the edit is of, if it was made of them.
+/// Makes `draft` what the edit says, and judges it; and whether nothing was written. `survey`: of the records that the edit is of, if it was made of them.
 fn write(
     draft: Draft<'_, '_>,
     mesh: &MeshFile,
-    Mended { edit, evidence, surface, may_be_copied }: &Mended,
+    Mended { edit, evidence, surface, good }: &Mended,
     survey: Option<Survey<'_>>,
     report: &mut Report,
     (output, limits, progress): (&Path, &Limits, &dyn Progress),
     clock: &mut Clock,
-) -> Result<emit::Written> {
+) -> Result<(emit::Written, bool)> {
     // Good as it came, or nothing in it could be repaired.
-    let same = edit.is_empty() && *may_be_copied && judging::flaws(mesh.findings()).is_empty();
+    let same = edit.is_empty() && *good != Good::IsWritten && judging::flaws(mesh.findings()).is_empty();
     let expected = survey
         .as_ref()
         .filter(|_| !same)
         .and_then(|survey| expectation(mesh.records(), edit, survey.irregular_triangles.len() as u64, limits));
-    let emit = || draft.finish(&if same { Content::Input } else { Content::Edited(edit) });
+    let content = match good {
+        Good::Stays if same => Content::Nothing,
+        _ if same => Content::Input,
+        _ => Content::Edited(edit),
+    };
+    let emit = || draft.finish(&content);
     // What the file will hold is looked at while it is written. It counts when the file was read back and does hold that.
     let look = || second_look(survey?, expected.as_ref(), &report.profile);
     let threads = if mesh.bytes().len() < HASHED_BY_ONE { 1 } else { limits.threads };
@@ -252,13 +272,17 @@ fn write(
     clock.stage("emit");
     report.edit = edit.summary(mesh.records().len());
     report.edit_records = limits.list_edit.then(|| edit.listed());
+    if matches!(content, Content::Nothing) {
+        keep(report, mesh, limits, progress)?;
+        return Ok((written, true));
+    }
     if same {
         confirm_copy(report, mesh, output, limits, progress)?;
     } else {
         let known = expected.map(|expected| (expected, digest, looked));
         verify(report, mesh, (surface, evidence), known, output, limits, progress)?;
     }
-    Ok(written)
+    Ok((written, false))
 }
 
 /// What the file will hold after `edit`, where a look at the difference costs less than reading all of it, and its tables fit in memory.
@@ -296,9 +320,19 @@ fn confirm_copy(report: &mut Report, input: &MeshFile, output: &Path, limits: &L
     if facts.blake3 != report.input.blake3 {
         return Err(Error::Changed { path: input.path().into() });
     }
-    judging::conclude_unchanged(report, &facts, written.findings());
+    conclude(report, &written, facts, limits, progress)
+}
+
+/// The input is its own result: what was found in it holds.
+fn keep(report: &mut Report, input: &MeshFile, limits: &Limits, progress: &dyn Progress) -> Result<()> {
+    conclude(report, input, report.input.clone(), limits, progress)
+}
+
+/// Concludes a report on a mesh to which nothing was done.
+fn conclude(report: &mut Report, mesh: &MeshFile, facts: FileFacts, limits: &Limits, progress: &dyn Progress) -> Result<()> {
+    judging::conclude_unchanged(report, &facts, mesh.findings());
     report.output = Some(facts);
-    judging::look_for_thin_walls(report, &Surface { records: written.records(), limits, progress })
+    judging::look_for_thin_walls(report, &Surface { records: mesh.records(), limits, progress })
 }
 
 /// Reads the written file again and judges it, against the box of the input's surface and the bodies in it that lay in others.

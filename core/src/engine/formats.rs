@@ -105,7 +105,7 @@ pub(crate) fn into_stl(mesh: MeshFile, output: &Path, target: Target, work: Work
     let spool = nameless.as_ref().map(Nameless::path);
     let doubt = mesh.doubt();
     let made = making::make(mesh, spool.as_deref().unwrap_or(output), target.is_input, work, clock)?;
-    let Made { mut report, mesh, edit } = made;
+    let Made { mut report, mesh, edit, .. } = made;
     carried::ask_if_doubtful(&mut report, doubt);
     if report.output.is_none() {
         return Ok(report);
@@ -235,8 +235,7 @@ pub(crate) fn convert(
         }
         None if !target.is_input => {
             let edit = Edit::default();
-            let made = emit::draft(&mesh, output, limits, progress, |draft| draft.finish(&Content::Edited(&edit)));
-            made?.0.durable()?;
+            emit::write(&mesh, output, &Content::Edited(&edit), limits, progress)?.durable()?;
             let written = files::open(output, limits, progress)?;
             confirm(&mesh, &written, limits)?;
             written

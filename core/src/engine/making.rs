@@ -1,18 +1,20 @@
 //! A mesh that is repaired, and then shaped as the profile wants it: rid of features and residue, smoothed, simplified.
 //!
-//! The repaired mesh is a nameless STL, which is judged by what the repair did to its input. After each step it is another one, which is judged
+//! The repaired mesh is a nameless STL, which is judged by what the repair did to its input; an input that is good stays where it is. After each step it is another one, which is judged
 //! by itself: it takes the place of the one before if it is no worse. An edit of the input says what all of them did.
 
 use std::path::Path;
 
 use crate::contract::error::Result;
+use crate::contract::report::Report;
 use crate::contract::settings::Limits;
 use crate::engine::clock::Clock;
 use crate::engine::copying;
-use crate::engine::files::{self, Made};
+use crate::engine::files::{self, Good, Made};
 use crate::engine::shaping::{self, Change, Origins, Step};
 use crate::engine::work::Work;
 use crate::io::read::MeshFile;
+use crate::io::record::Record;
 use crate::io::write_behind::Nameless;
 use crate::output::edit::Edit;
 use crate::output::emit::{self, Content};
@@ -25,29 +27,38 @@ pub(crate) fn make(mesh: MeshFile, output: &Path, is_of_target: bool, work: Work
     let Work { profile, limits, progress } = work;
     let steps = shaping::steps(profile);
     if steps.is_empty() {
-        return files::make(mesh, output, is_of_target, (profile, limits), progress, clock);
+        let good = if is_of_target { Good::IsCopied } else { Good::IsWritten };
+        return files::make(mesh, output, good, (profile, limits), progress, clock);
     }
-    let mut spool = Nameless::new(limits)?;
-    let mut made = files::make(mesh, &spool.path(), is_of_target, (profile, &of_spools(limits)), progress, clock)?;
+    let good = if is_of_target { Good::Stays } else { Good::IsWritten };
+    let spool = Nameless::new(limits)?;
+    let mut made = files::make(mesh, &spool.path(), good, (profile, &of_spools(limits)), progress, clock)?;
     made.report.limits.defer_sync = limits.defer_sync;
     if made.report.output.is_none() {
         return Ok(made);
     }
+    let mut spool = (!made.stays).then_some(spool);
     for step in &steps {
-        let current = files::open(&spool.path(), limits, progress)?.called(made.mesh.path());
+        let spooled = spool.as_ref().map(|spool| files::open(&spool.path(), limits, progress)).transpose()?;
+        let spooled = spooled.map(|mesh| mesh.called(made.mesh.path()));
+        let current = spooled.as_ref().unwrap_or(&made.mesh);
         let origins = || Origins { of: made.edit.origins(made.mesh.records()), inputs: made.mesh.records().len() };
         match step.look((current.path(), current.records()), (&made.report, &origins), work)? {
             Ok(change) => {
                 clock.stage(step.stage());
-                if let Some(next) = changed(&current, (step, change), &mut made, work)? {
-                    drop(current);
-                    spool = next;
+                let so_far = SoFar { report: &mut made.report, edit: &mut made.edit, records: made.mesh.records() };
+                if let Some(next) = changed(current, (step, change), so_far, work)? {
+                    spool = Some(next);
                 }
             }
             Err(told) => told.put(&mut made.report),
         }
     }
-    let written = copying::copy(&spool.path(), output, limits, progress)?;
+    let written = match &spool {
+        Some(spool) => copying::copy(&spool.path(), output, limits, progress)?,
+        None => copying::copy_open(&made.mesh, output, limits, progress)?,
+    };
+    made.mesh.check_unchanged()?;
     clock.stage("emit");
     let facts = files::facts(&written, files::hash(&written, limits, progress));
     if made.report.certificate.as_ref().is_some_and(|certificate| certificate.blake3 != facts.blake3) {
@@ -62,28 +73,126 @@ fn of_spools(limits: &Limits) -> Limits {
     Limits { defer_sync: true, ..limits.clone() }
 }
 
+/// All that was done so far.
+struct SoFar<'a> {
+    report: &'a mut Report,
+    /// Of the input's records.
+    edit: &'a mut Edit,
+    records: &'a [Record],
+}
+
 /// Writes the changed mesh, if it changes and is no worse then; completes the report and the edit.
-fn changed(mesh: &MeshFile, (step, mut change): (&Step, Change), made: &mut Made, work: Work<'_>) -> Result<Option<Nameless>> {
+fn changed(
+    mesh: &MeshFile,
+    (step, mut change): (&Step, Change),
+    SoFar { report, edit, records }: SoFar<'_>,
+    work: Work<'_>,
+) -> Result<Option<Nameless>> {
     let Work { profile, limits, progress } = work;
     if change.is_none() {
-        change.told.put(&mut made.report);
+        change.told.put(report);
         return Ok(None);
     }
     // They may be many: there is one copy of them.
     let own = Edit::default().then(mesh.records(), &change.gone, std::mem::take(&mut change.added), step.repair());
+    let counts = [change.count_gone(), own.added_with_origins().count() as u64];
     let spool = Nameless::new(limits)?;
     let path = spool.path();
-    emit::draft(mesh, &path, &of_spools(limits), progress, |draft| draft.finish(&Content::Edited(&own)))?.0.durable()?;
+    emit::write(mesh, &path, &Content::Edited(&own), &of_spools(limits), progress)?.durable()?;
     let written = files::open(&path, limits, progress)?.called(mesh.path());
-    change.added = own.into_added();
     let judged = files::look(&written, (profile, limits), progress, &mut Clock::start())?;
-    if !shaping::is_no_worse(&made.report, &judged) {
-        change.told.left(&judged).put(&mut made.report);
+    if !shaping::is_no_worse(report, &judged) {
+        change.told.left(&judged).put(report);
         return Ok(None);
     }
-    let edit = std::mem::take(&mut made.edit);
-    let counts = [change.count_gone(), change.added.len() as u64];
-    made.edit = edit.then(made.mesh.records(), &change.gone, change.added, step.repair());
-    shaping::tell(&mut made.report, (step, change.told, counts), judged, Some((&made.edit, made.mesh.records().len())));
+    *edit = match std::mem::take(edit) {
+        // The mesh is of the input's records.
+        so_far if so_far.is_empty() => own,
+        so_far => so_far.then(records, &change.gone, own.into_added(), step.repair()),
+    };
+    shaping::tell(report, (step, change.told, counts), judged, Some((edit, records.len())));
     Ok(Some(spool))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::PathBuf;
+
+    use super::*;
+    use crate::contract::error::Error;
+    use crate::contract::progress::{Progress, Quiet};
+    use crate::contract::report::Outcome;
+    use crate::contract::settings::Profile;
+    use crate::engine::entry::repair;
+    use crate::testing::{Corners, cube, records, shaken_torus};
+
+    struct Place {
+        folder: tempfile::TempDir,
+        input: PathBuf,
+    }
+
+    impl Place {
+        /// A binary STL.
+        fn of(triangles: &[Corners]) -> Self {
+            let folder = tempfile::tempdir().unwrap();
+            let input = folder.path().join("part.stl");
+            let records = records(triangles);
+            let count = (records.len() as u32).to_le_bytes();
+            std::fs::write(&input, [&[0; 80][..], &count, records.as_flattened()].concat()).unwrap();
+            Self { folder, input }
+        }
+
+        fn simplify(&self, triangles: u64, progress: &dyn Progress) -> Result<(Report, Vec<u8>)> {
+            let output = self.folder.path().join(format!("{triangles}.stl"));
+            let profile = Profile { simplify_triangles: triangles, ..Profile::default() };
+            let report = repair(&self.input, &output, &profile, &Limits { threads: 2, ..Limits::default() }, progress)?;
+            Ok((report, std::fs::read(output).unwrap_or_default()))
+        }
+    }
+
+    /// Appends to the file when the step begins.
+    struct Touch<'a>(&'a Path);
+
+    impl Progress for Touch<'_> {
+        fn at(&self, stage: &'static str, _: u64, _: u64) {
+            if stage == "simplify" {
+                let mut bytes = std::fs::read(self.0).unwrap();
+                bytes.push(7);
+                std::fs::write(self.0, bytes).unwrap();
+            }
+        }
+    }
+
+    /// No step changes it: it is a copy, to the last byte.
+    #[test]
+    fn a_good_file_to_which_nothing_is_to_be_done_is_copied() {
+        let place = Place::of(&cube());
+        let (report, written) = place.simplify(100, &Quiet).unwrap();
+        assert_eq!((report.outcome, report.edit.untouched), (Outcome::Clean, 12));
+        assert_eq!(written, std::fs::read(&place.input).unwrap());
+        assert_eq!(report.output.unwrap().blake3, report.input.blake3);
+    }
+
+    /// The result is that of a file that had to be written anew first.
+    #[test]
+    fn a_good_file_is_shaped_where_it_is() {
+        let good = shaken_torus(0.0);
+        let (report, written) = Place::of(&good).simplify(20_000, &Quiet).unwrap();
+        assert_eq!((report.outcome, report.edit.untouched + report.edit.added), (Outcome::Repaired, 20_000));
+        // One triangle without area more, which goes first.
+        let broken: Vec<Corners> = good.iter().copied().chain([[good[0][0]; 3]]).collect();
+        let (other, same) = Place::of(&broken).simplify(20_000, &Quiet).unwrap();
+        assert_eq!(written, same);
+        assert_eq!((other.edit.deleted, other.edit.added), (report.edit.deleted + 1, report.edit.added));
+    }
+
+    #[test]
+    fn a_file_that_changes_while_it_is_shaped_is_an_error() {
+        // As it is, and made simpler.
+        for triangles in [200_000, 20_000] {
+            let place = Place::of(&shaken_torus(0.0));
+            let result = place.simplify(triangles, &Touch(&place.input));
+            assert!(matches!(result, Err(Error::Changed { .. })), "{result:?}");
+        }
+    }
 }

@@ -4,6 +4,10 @@ mod compose;
 #[cfg(test)]
 mod tests;
 
+use std::ops::Range;
+
+use rayon::prelude::*;
+
 use crate::contract::report::{EditRecords, EditSummary, FaceOrigin, RepairName};
 use crate::geometry::distance::distance;
 use crate::io::record::{self, Record};
@@ -21,6 +25,9 @@ pub(crate) enum Change {
     /// The same triangle with moved vertices.
     Move(Box<Record>),
 }
+
+/// Words of bits that one thread looks through at a time.
+const WORDS_AT_ONCE: usize = 64;
 
 /// As the budget counts them.
 const _: () = assert!(size_of::<(u32, Change)>() == 24);
@@ -185,9 +192,16 @@ impl Edit {
         self.changes.iter().map(|(t, _)| *t).chain(ones(&self.flipped)).chain(ones(&self.dropped))
     }
 
-    /// The numbers of the records that are left out, each once.
-    pub(crate) fn deleted_records(&self) -> impl Iterator<Item = u32> {
-        self.changes.iter().filter(|change| change.1 == Change::Delete).map(|(t, _)| *t).chain(ones(&self.dropped))
+    /// The numbers of those of the records that are left out for which `is_wanted` holds, each once. They may be nearly all there are: all threads look.
+    pub(crate) fn deleted_where(&self, is_wanted: impl Fn(u32) -> bool + Sync) -> Vec<u32> {
+        let deleted = self.changes.iter().filter(|change| change.1 == Change::Delete).map(|(t, _)| *t);
+        let mut wanted: Vec<u32> = deleted.filter(|t| is_wanted(*t)).collect();
+        let of_words = |(k, words): (usize, &[u64])| {
+            let first = (k * WORDS_AT_ONCE * 64) as u32;
+            ones(words).map(move |t| first + t).filter(|t| is_wanted(*t)).collect::<Vec<_>>()
+        };
+        wanted.par_extend(self.dropped.par_chunks(WORDS_AT_ONCE).enumerate().flat_map_iter(of_words));
+        wanted
     }
 
     /// Records in the output.
@@ -229,6 +243,13 @@ impl Edit {
             if next > start {
                 step(Step::Untouched(&records[start..next]))?;
             }
+            if next == dropped && next < next_change && added.len() == 0 {
+                // They may be nearly all there are.
+                at = bits::next_zero(&self.dropped, next).min(next_change);
+                step(Step::Deleted(next as u32..at as u32))?;
+                (start, dropped, turned) = (at, next_one(&self.dropped, at), next_one(&self.flipped, at));
+                continue;
+            }
             let place = next as u32;
             let flipped = || Step::Changed(place, record::flip(&records[next]), FaceOrigin::Flipped(place));
             step(match changes.next_if(|c| c.0 == place).map(|c| &c.1) {
@@ -236,7 +257,7 @@ impl Edit {
                 Some(Change::Flip) => flipped(),
                 Some(Change::Move(record)) => Step::Changed(place, **record, FaceOrigin::Moved(place)),
                 Some(Change::Delete) | None => {
-                    added.next().map_or(Step::Deleted(place), |(record, from)| Step::Changed(place, *record, *from))
+                    added.next().map_or(Step::Deleted(place..place + 1), |(record, from)| Step::Changed(place, *record, *from))
                 }
             })?;
             at = next + 1;
@@ -268,7 +289,7 @@ impl Edit {
                     origins.push(from.input_face());
                     at += 1;
                 }
-                Step::Deleted(_) => at += 1,
+                Step::Deleted(places) => at += places.len() as u32,
                 Step::Added(_, from) => origins.push(from.input_face()),
             }
             Ok(())
@@ -355,7 +376,8 @@ pub(crate) enum Step<'r, 'e> {
     Untouched(&'r [Record]),
     /// What stands in the place of the record of this number, and where it comes from.
     Changed(u32, Record, FaceOrigin),
-    Deleted(u32),
+    /// Nothing stands in the places of these.
+    Deleted(Range<u32>),
     Added(&'e Record, FaceOrigin),
 }
 

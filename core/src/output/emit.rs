@@ -39,6 +39,8 @@ pub(crate) enum Content<'a> {
     Input,
     /// The input's triangles as the edit leaves them.
     Edited(&'a Edit),
+    /// None: the input itself is the result.
+    Nothing,
 }
 
 impl Content<'_> {
@@ -47,6 +49,7 @@ impl Content<'_> {
         match self {
             Self::Input => u64::MAX,
             Self::Edited(edit) => end_of(edit.first_gap().map_or(mesh.records().len(), |gap| gap as usize)),
+            Self::Nothing => 0,
         }
     }
 }
@@ -66,16 +69,45 @@ struct Wanted {
     given_up: AtomicBool,
 }
 
-/// Lets `work` make the new file `output` of `mesh`, which is copied to it meanwhile where there is a thread to spare.
-pub(crate) fn draft<R>(
+/// Makes the new file `output`, of a mesh of which it is known already what it is to hold.
+///
+/// # Errors
+/// [`Error`], any of them.
+pub(crate) fn write(
     mesh: &MeshFile,
     output: &Path,
+    content: &Content<'_>,
+    limits: &Limits,
+    progress: &dyn Progress,
+) -> Result<Written> {
+    let mut sink = Sink::create(mesh, output, limits, progress)?;
+    sink.hold(content, limits)?;
+    sink.finish(limits)
+}
+
+/// What of a mesh is copied while it is not known yet what the output is to hold.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Ahead {
+    /// As much as may be in the output.
+    All,
+    /// Nothing: it is hashed, and no more.
+    Nothing,
+}
+
+/// Lets `work` make the new file `output` of `mesh`, which is hashed, and copied to it, meanwhile, where there is a thread to spare.
+pub(crate) fn draft<R>(
+    mesh: &MeshFile,
+    (output, ahead): (&Path, Ahead),
     limits: &Limits,
     progress: &dyn Progress,
     work: impl FnOnce(Draft<'_, '_>) -> Result<R>,
 ) -> Result<R> {
-    // What stands behind the records is copied only with a file that may turn out to be good as it is.
-    let bytes = if mesh.is_flawless() { u64::MAX } else { end_of(mesh.records().len()) };
+    let bytes = match ahead {
+        Ahead::Nothing => 0,
+        Ahead::All if mesh.is_flawless() => u64::MAX,
+        // What stands behind the records is copied only with a file that may turn out to be good as it is.
+        Ahead::All => end_of(mesh.records().len()),
+    };
     let wanted = Wanted { bytes: AtomicU64::new(bytes), awaited: AtomicBool::new(false), given_up: AtomicBool::new(false) };
     let is_ahead = mesh.is_in_place() && limits.threads > 1 && mesh.bytes().len() >= COPIED_AHEAD;
     std::thread::scope(|scope| {
@@ -203,7 +235,11 @@ impl<'a> Sink<'a> {
     fn hold(&mut self, content: &Content<'_>, limits: &Limits) -> Result<()> {
         let records = self.mesh.records();
         let _put = Guide::new(records.as_flattened(), limits).in_order(records);
-        let Content::Edited(edit) = content else { return self.put_input(self.mesh.bytes()) };
+        let edit = match content {
+            Content::Nothing => return Ok(()),
+            Content::Input => return self.put_input(self.mesh.bytes()),
+            Content::Edited(edit) => edit,
+        };
         let count = edit.output_records(records.len());
         let count = u32::try_from(count).map_err(|_| Error::Refused {
             path: self.mesh.path().into(),
@@ -410,7 +446,7 @@ mod tests {
         for (behind, whole) in [(vec![], mesh.len()), (vec![7; 3 << 20], mesh.len())] {
             std::fs::write(&input, [&mesh[..], &behind].concat()).unwrap();
             let file = MeshFile::open(&input, folder.path(), &limits, &Quiet).unwrap();
-            let written = draft(&file, &output, &limits, &Quiet, |draft| {
+            let written = draft(&file, (&output, Ahead::All), &limits, &Quiet, |draft| {
                 while !draft.copying.as_ref().unwrap().is_finished() {
                     std::thread::yield_now();
                 }

@@ -71,10 +71,10 @@ impl<'a> Expectation<'a> {
                     difference.fresh.push((place, record));
                     (at, 1, Expected::Fresh(fresh))
                 }
-                Step::Deleted(place) => {
-                    difference.gone.push(place);
-                    difference.deleted.push(place);
-                    at += 1;
+                Step::Deleted(places) => {
+                    at += places.len();
+                    difference.gone.extend(places.clone());
+                    difference.deleted.extend(places);
                     return Ok(());
                 }
                 Step::Added(record, _) => {

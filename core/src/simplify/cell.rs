@@ -9,7 +9,7 @@ use crate::simplify::guard::Guard;
 use crate::simplify::legal::{self, Marks};
 use crate::simplify::partition;
 use crate::simplify::patch::{CREASE, FIXED, MOST, Patch, RIM, Star};
-use crate::simplify::queue::{Entry, Queue};
+use crate::simplify::queue::{self, Queue};
 
 /// A short edge is cheaper by this share of its length, squared, where surfaces are flat, so that triangles stay round.
 const STABILITY: f64 = 1e-3;
@@ -45,6 +45,8 @@ pub(super) struct Work {
     guard: Option<Guard>,
     marks: Marks,
     stars: [Star; 2],
+    /// Vertices with an edge that could not collapse, and is not in the queue: it may when one of its ends changes.
+    is_refused: Vec<bool>,
 }
 
 impl Work {
@@ -59,8 +61,8 @@ impl Work {
         let guard = is_guarded.then(|| Guard::new(&patch, obstacles.iter().map(|o| o.1).collect()));
         let marks = Marks::new(patch.points.len());
         let queue = Queue::new(patch.corners.len());
-        let mut work =
-            Self { patch, cell, obstacles, outer, is_limited: false, rules, queue, guard, marks, stars: Default::default() };
+        let (is_refused, stars) = (vec![false; patch.points.len()], Default::default());
+        let mut work = Self { patch, cell, obstacles, outer, is_limited: false, rules, queue, guard, marks, stars, is_refused };
         for corner in 0..work.patch.corners.len() {
             let after = if corner % 3 == 2 { corner - 2 } else { corner + 1 };
             let ends = [work.patch.corners[corner], work.patch.corners[after]];
@@ -76,19 +78,27 @@ impl Work {
     /// Puts an edge into the queue, at what it costs now.
     #[inline]
     fn enter(&mut self, ends: [u32; 2]) {
-        let Some((value, cost, _)) = self.price(ends) else { return };
+        if let Some((cost, _)) = self.cost(ends) {
+            self.queue.push(cost, ends);
+        }
+    }
+
+    /// The cost of an edge that may collapse, and where to.
+    #[inline]
+    fn cost(&mut self, ends: [u32; 2]) -> Option<(f32, Point)> {
+        let (value, cost, to) = self.price(ends)?;
         let strict = ends.iter().map(|v| usize::from(self.patch.strict[*v as usize])).fold(0, usize::max);
         if value > self.rules.limits[strict.min(LIMITS - 1)] {
             self.is_limited = true;
-            return;
+            self.refuse(ends);
+            return None;
         }
-        self.queue.push(cost as f32, Entry { ends, version: self.version(ends) });
+        Some((cost as f32, to))
     }
 
-    /// The sum of the versions of both ends.
     #[inline]
-    fn version(&self, [u, v]: [u32; 2]) -> u32 {
-        self.patch.versions[u as usize].wrapping_add(self.patch.versions[v as usize])
+    fn refuse(&mut self, ends: [u32; 2]) {
+        ends.iter().for_each(|v| self.is_refused[*v as usize] = true);
     }
 
     /// The quadric's value by its weight, the cost, and the best place for the vertex that two become. The first one is no freer than the second.
@@ -132,37 +142,42 @@ impl Work {
         Some((best.0.0, best.0.1, best.1))
     }
 
-    /// How many edges of about the same cost are still to be looked at, stale entries among them, by buckets of the queue.
+    /// How many edges are still to be looked at, by buckets of what they cost when they were priced last; some are gone.
     pub(super) fn counts(&self) -> impl Iterator<Item = usize> + '_ {
         self.queue.counts()
     }
 
     /// Collapses edges up to the bucket `most`, until no more than `count` triangles are left. Returns at how many it looked.
+    ///
+    /// An edge whose ends have changed is priced anew when it comes up, not before: most change several times until then.
     pub(super) fn advance(&mut self, most: usize, count: usize) -> usize {
         let mut stars = std::mem::take(&mut self.stars);
         let mut looked_at = 0;
         while self.patch.live > count {
-            let next = self.queue.cheapest().filter(|bucket| *bucket <= most).and_then(|bucket| self.queue.pop(bucket));
-            let Some(entry) = next else { break };
+            let Some(bucket) = self.queue.cheapest().filter(|bucket| *bucket <= most) else { break };
+            let Some(ends) = self.queue.pop(bucket) else { break };
             looked_at += 1;
-            let ends = entry.ends;
-            if self.version(ends) == entry.version && ends.iter().all(|v| self.patch.is_there(*v)) {
-                self.collapse(ends, &mut stars);
+            if !ends.iter().all(|v| self.patch.is_there(*v)) {
+                continue;
+            }
+            let Some((cost, to)) = self.cost(ends) else { continue };
+            if queue::bucket(cost) > bucket {
+                self.queue.push(cost, ends);
+            } else if !self.collapse(ends, to, &mut stars) {
+                self.refuse(ends);
             }
         }
         self.stars = stars;
         looked_at
     }
 
-    /// Collapses an edge if it may be.
-    fn collapse(&mut self, ends: [u32; 2], [of_u, of_v]: &mut [Star; 2]) {
-        let Some((_, _, to)) = self.price(ends) else { return };
-        let [mut u, mut v] = ends;
+    /// Collapses an edge, if it may be.
+    fn collapse(&mut self, [mut u, mut v]: [u32; 2], to: Point, [of_u, of_v]: &mut [Star; 2]) -> bool {
         if self.patch.kinds[u as usize] > self.patch.kinds[v as usize] || to == self.patch.points[u as usize] {
             (u, v) = (v, u);
         }
         if !self.patch.star(u, of_u) || !self.patch.star(v, of_v) || of_u.len + of_v.len > MOST + 4 {
-            return;
+            return false;
         }
         let stays = to == self.patch.points[v as usize];
         let shape = self.rules.shape;
@@ -184,7 +199,7 @@ impl Work {
                 .all(|(_, ring)| ring.iter().all(|w| self.patch.count(*w) <= MOST))
             && self.guard.as_mut().is_none_or(|guard| guard.allows(&self.patch, [u, v], &to, of_u, of_v));
         if !is_legal {
-            return;
+            return false;
         }
         let patch = &mut self.patch;
         let at = |w: u32| patch.quadrics[w as usize].wide().around(place(to) - place(patch.points[w as usize]));
@@ -194,13 +209,23 @@ impl Work {
         if let Some(guard) = &mut self.guard {
             of_u.without(v).chain(of_v.without(u)).for_each(|(corner, _)| guard.grow(patch, corner));
         }
+        self.enter_around([u, v], of_u, of_v);
+        true
+    }
+
+    /// Puts the edges that `u` has brought to `v` into the queue. Those that `v` had are there, but for some that were refused.
+    fn enter_around(&mut self, [u, v]: [u32; 2], of_u: &Star, of_v: &Star) {
         self.marks.clear();
-        for (_, ring) in of_u.without(v).chain(of_v.without(u)) {
-            for w in ring {
-                if self.marks.mark(w) {
-                    self.enter([v, w]);
-                }
+        for w in of_v.without(u).flat_map(|(_, ring)| ring) {
+            if self.marks.mark(w) && self.is_refused[v as usize] && self.is_refused[w as usize] {
+                self.enter([v, w]);
             }
         }
+        for w in of_u.without(v).flat_map(|(_, ring)| ring) {
+            if self.marks.mark(w) {
+                self.enter([v, w]);
+            }
+        }
+        self.is_refused[v as usize] |= self.is_refused[u as usize];
     }
 }

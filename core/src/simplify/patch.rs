@@ -55,8 +55,6 @@ pub(super) struct Patch {
     pub(super) kinds: Vec<u8>,
     /// By which of the limits a vertex is judged; a higher one is stricter.
     pub(super) strict: Vec<u8>,
-    /// How often a vertex, or its quadric, has changed.
-    pub(super) versions: Vec<u32>,
     /// The vertex at each corner, [`NONE`] at those of triangles that are gone.
     pub(super) corners: Vec<u32>,
     /// The vertex that a vertex has become, itself while it is there.
@@ -95,19 +93,7 @@ impl Patch {
             }
         }
         let live = corners.len() / 3;
-        Self {
-            points,
-            quadrics,
-            kinds,
-            strict,
-            versions: vec![0; count],
-            corners,
-            became: (0..count as u32).collect(),
-            next,
-            first,
-            counts,
-            live,
-        }
+        Self { points, quadrics, kinds, strict, corners, became: (0..count as u32).collect(), next, first, counts, live }
     }
 
     /// The triangles around a vertex; false if they are none, or too many.
@@ -178,9 +164,6 @@ impl Patch {
         self.counts[v as usize] = (of_u.len + of_v.len - 2 * gone) as u32;
         self.became[u as usize] = v;
         self.strict[v as usize] = self.strict[v as usize].max(self.strict[u as usize]);
-        for w in [u, v] {
-            self.versions[w as usize] = self.versions[w as usize].wrapping_add(1);
-        }
     }
 
     /// Lets go of the corners at a vertex that belong to triangles that are gone.

@@ -1,6 +1,5 @@
-//! Edges by what their collapse costs: in buckets, 16 for each doubling of the cost, the first come of a bucket first. Entries go stale when a
-//! vertex changes, and are thrown away when they come up. To add one and to take one are O(1), as a heap is not; a cost that is less than 7 %
-//! larger is not told from another one.
+//! Edges by what their collapse costs: in buckets, 16 for each doubling of the cost, the first come of a bucket first. To add one and to take one are
+//! O(1), as a heap is not; a cost that is less than 7 % larger is not told from another one.
 
 use crate::util::ids::NONE;
 
@@ -13,13 +12,8 @@ pub(super) const BUCKETS: usize = 1 << (31 - SHIFT);
 /// So many buckets are a group.
 const GROUP: usize = u64::BITS as usize;
 
-/// An edge at the time it was looked at.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Entry {
-    pub(super) ends: [u32; 2],
-    /// The sum of the versions of its ends, which only grows: another sum tells that one has changed.
-    pub(super) version: u32,
-}
+/// An edge, by its ends.
+type Entry = [u32; 2];
 
 /// Entries of a chunk: they are read in a row, not from all over the memory.
 const CHUNK: usize = 16;
@@ -152,20 +146,20 @@ mod tests {
             let mut want: Vec<(usize, u32)> = Vec::new();
             for (number, (cost, takes)) in (0..).zip(costs) {
                 let cost = f32::from(cost).powi(3);
-                queue.push(cost, Entry { ends: [number, 0], version: 0 });
+                queue.push(cost, [number, 0]);
                 want.push((bucket(cost), number));
                 if takes {
                     want.sort_unstable();
                     let first = want.remove(0);
                     prop_assert_eq!(queue.cheapest(), Some(first.0));
-                    prop_assert_eq!(queue.pop(first.0).map(|entry| entry.ends[0]), Some(first.1));
+                    prop_assert_eq!(queue.pop(first.0).map(|ends| ends[0]), Some(first.1));
                 }
                 prop_assert_eq!(queue.counts().sum::<usize>(), want.len());
             }
             want.sort_unstable();
             for (at, number) in want {
                 prop_assert_eq!(queue.cheapest(), Some(at));
-                prop_assert_eq!(queue.pop(at).map(|entry| entry.ends[0]), Some(number));
+                prop_assert_eq!(queue.pop(at).map(|ends| ends[0]), Some(number));
             }
             prop_assert_eq!(queue.cheapest(), None);
         }

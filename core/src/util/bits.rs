@@ -57,6 +57,21 @@ pub(crate) fn next_one(bits: &[u64], at: usize) -> usize {
     usize::MAX
 }
 
+/// The first bit that is not set from `at` on, or past the end of all words.
+pub(crate) fn next_zero(bits: &[u64], at: usize) -> usize {
+    let mut word = at / 64;
+    let mut mask = !0u64 << (at % 64);
+    while word < bits.len() {
+        let found = !bits[word] & mask;
+        if found != 0 {
+            return word * 64 + found.trailing_zeros() as usize;
+        }
+        word += 1;
+        mask = !0;
+    }
+    at.max(bits.len() * 64)
+}
+
 /// All bits that are set.
 pub(crate) fn ones(bits: &[u64]) -> impl Iterator<Item = u32> + '_ {
     let next = |at: usize| Some(next_one(bits, at)).filter(|one| *one != usize::MAX);
@@ -101,6 +116,12 @@ mod tests {
         for end in [0, 1, 63, 64, 65] {
             let mut bits = all(end);
             assert_eq!(ones(&bits).collect::<Vec<_>>(), (0..end as u32).collect::<Vec<_>>());
+            // Beyond the end no bit of the last word is set.
+            assert!((0..end).all(|at| next_zero(&bits, at) == end), "{end}");
+            if end > 1 {
+                take(&mut bits, end - 2);
+                assert_eq!([0, end - 1].map(|at| next_zero(&bits, at)), [end - 2, end]);
+            }
             (0..end + 9).for_each(|number| take(&mut bits, number));
             assert_eq!(count(&bits), 0);
         }

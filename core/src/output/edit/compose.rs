@@ -68,7 +68,7 @@ impl Edit {
                     dropped.extend(is_gone(made).then_some(new));
                     (made, came, new) = (made + 1, came + 1, new + 1);
                 }
-                Step::Deleted(_) => came += 1,
+                Step::Deleted(places) => came += places.len(),
                 Step::Added(..) => {
                     dropped.extend(is_gone(made).then_some(new));
                     (made, new) = (made + 1, new + 1);

@@ -71,10 +71,11 @@ fn an_edit_of_what_was_set_right_is_told_of_what_it_comes_from() {
 proptest! {
     /// The walk gives record by record what the edit says of it, and the summary and the list count the same.
     #[test]
-    fn walking_does_what_the_edit_says(fates in prop::collection::vec(0u8..5, 0..200), added in 0usize..3) {
+    fn walking_does_what_the_edit_says(fates in prop::collection::vec(0u8..6, 0..200), added in 0usize..3) {
         let input = records(&vec![HERE; fates.len()]);
         let [moved, new] = [record::encode(THERE, 0), record::encode(THERE, 7)];
-        let mut edit = Edit { flipped: vec![0; fates.len().div_ceil(64)], ..Edit::default() };
+        let none = vec![0; fates.len().div_ceil(64)];
+        let mut edit = Edit { flipped: none.clone(), dropped: none, ..Edit::default() };
         (0..added).for_each(|_| edit.add(THERE, 7, FaceOrigin::Repair(RepairName::Fill)));
         let (mut want, mut left) = (Vec::new(), added);
         let mut gap = None;
@@ -85,22 +86,23 @@ proptest! {
                 1 => edit.changes.push((t as u32, Change::Delete)),
                 2 => edit.changes.push((t as u32, Change::Flip)),
                 3 => edit.changes.push((t as u32, Change::Move(Box::new(moved)))),
-                // Of a reversed region.
+                // Of a region that goes, and of a reversed one.
+                5 => bits::put(&mut edit.dropped, t),
                 _ => bits::put(&mut edit.flipped, t),
             }
             match fate {
                 2 | 4 => want.push(record::flip(&before)),
                 3 => want.push(moved),
-                1 if left > 0 => {
+                1 | 5 if left > 0 => {
                     want.push(new);
                     left -= 1;
                 }
-                1 if gap.is_none() => gap = Some(t as u32),
+                1 | 5 if gap.is_none() => gap = Some(t as u32),
                 _ => {}
             }
         }
         want.extend(vec![new; left]);
-        edit.deletions = fates.iter().filter(|f| **f == 1).count() as u64;
+        edit.deletions = fates.iter().filter(|f| [1, 5].contains(*f)).count() as u64;
         edit.flips = fates.iter().filter(|f| **f == 2 || **f == 4).count() as u64;
         prop_assert_eq!(edit.first_gap(), gap);
         prop_assert_eq!(edit.output_records(input.len()), want.len() as u64);

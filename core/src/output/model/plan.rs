@@ -94,9 +94,9 @@ impl Change<'_> {
                         }
                     }
                 }
-                Step::Deleted(_) => {
-                    at += 1;
-                    step(Fate::Gone);
+                Step::Deleted(places) => {
+                    at += places.len();
+                    places.for_each(|_| step(Fate::Gone));
                 }
                 Step::Added(record, origin) => step(made(record, origin)),
             }

@@ -14,7 +14,7 @@ use suture_core::{ErrorClass, Profile, Report};
 use suture_store::Lease;
 use suture_store::job::{Duty, Kind, Withdrawal};
 use suture_store::patience::brief;
-use suture_store::{Claim, Job, JobId, JobStore, State, Step, StoreError, crash_point};
+use suture_store::{Claim, Job, JobId, JobStore, Role, State, Step, StoreError, crash_point};
 
 use crate::beside;
 use crate::carry::is_carried;
@@ -33,7 +33,7 @@ use crate::publish::{Conclusion, Desk, OUTPUT, discard, litter};
 use crate::publish_error::PublishError;
 use crate::pulse::Pulse;
 use crate::reuse::Sought;
-use crate::schedule::{Schedule, Turn, Waits};
+use crate::schedule::{Schedule, Sizes, Turn, Waits};
 use crate::settings::Settings;
 use crate::settle::Rest;
 use crate::supervise::{Cause, Ended};
@@ -94,6 +94,11 @@ impl Context {
         self.folders.iter().find(|folder| folder.name == job.source.folder)
     }
 
+    /// Is that part of the work this daemon's?
+    pub(crate) fn has(&self, role: Role) -> bool {
+        self.settings.now().roles.has(role)
+    }
+
     /// Bytes that results of a hot folder may still fill, on its disk and on that of its results; boundless where they do not say.
     pub(crate) fn room(&self, folder: &Folder) -> u64 {
         if folder.silence().is_some() {
@@ -136,7 +141,7 @@ impl Context {
 
     fn waits(&self) -> Result<Waits, StoreError> {
         // Whoever asks has the schedule, which others need; and an idle slot has nothing to lose by a database that is away.
-        match brief(|| Waits::of(&*self.store, self.settings.now().large)) {
+        match brief(|| Waits::of(&*self.store, Sizes::of(&self.settings.now()))) {
             Err(StoreError::Away { .. }) => Ok(Waits::default()),
             waits => waits,
         }
@@ -191,7 +196,7 @@ impl Slot {
             // Its memory belongs to the large file now.
             self.staff.dismiss();
         }
-        match self.context.store.claim(&turn.filter(self.context.settings.now().large)) {
+        match self.context.store.claim(&turn.filter(Sizes::of(&self.context.settings.now()))) {
             Ok(Some(claim)) => {
                 crash_point("daemon.claimed");
                 let job = claim.job.clone();

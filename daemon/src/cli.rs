@@ -7,11 +7,11 @@ use std::time::Duration;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use suture_store::job::Kind;
-use suture_store::{Address, Priority};
+use suture_store::{Address, Priority, Roles};
 
 use crate::units::{parse_duration, parse_listen, parse_size};
 use meshes::{ConvertArgs, DefeatureArgs, FillCurvesArgs, InspectArgs, RepairArgs, ResidueArgs, SimplifyArgs, SmoothArgs};
-use service::{CompletionsArgs, CurvesArgs, ManArgs, NightArgs, StatusArgs, StoreArgs, TopArgs};
+use service::{CompletionsArgs, CurvesArgs, HostsArgs, ManArgs, NightArgs, StatusArgs, StoreArgs, TopArgs};
 use spend::Spend;
 
 pub(crate) mod meshes;
@@ -79,6 +79,8 @@ pub(crate) enum Command {
     Jobs(JobsArgs),
     /// Check a job store, write its jobs as JSON, move it into a database that many machines share, or out of one
     Store(StoreArgs),
+    /// List the daemons that share a store, have one finish what it has and take nothing more, or have it take jobs again
+    Hosts(HostsArgs),
     /// Show how a hot folder's daemon stands: its queue, what is in work, what ended last, what keeps it from work
     Status(StatusArgs),
     /// Show that anew each second, until `q`
@@ -191,6 +193,9 @@ pub(crate) struct WatchArgs {
     /// Threads for one large file [default: all processors]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub threads: Option<u16>,
+    /// Leave files larger than this to other daemons, e.g. 2GiB
+    #[arg(long, value_name = "SIZE", value_parser = parse_size)]
+    pub largest: Option<u64>,
     /// How long a file must be at rest before it is taken, e.g. 5s
     #[arg(long, value_name = "TIME", value_parser = parse_duration)]
     pub settle: Option<Duration>,
@@ -198,6 +203,10 @@ pub(crate) struct WatchArgs {
     /// PGPASSWORD or ~/.pgpass
     #[arg(long, value_name = "URL", value_parser = Address::parse)]
     pub store: Option<Address>,
+    /// What this daemon does of the work on folders in buckets, with other daemons of the same store for the rest: some of intake, worker, control, with
+    /// commas [default: all]
+    #[arg(long = "role", value_name = "ROLES")]
+    pub roles: Option<Roles>,
     /// Serve the HTTP interface here, e.g. 127.0.0.1:7878; beyond this machine only with tokens, which a configuration names
     #[arg(long, value_name = "ADDR", value_parser = parse_listen)]
     pub listen: Option<SocketAddr>,

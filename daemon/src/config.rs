@@ -7,7 +7,7 @@ use std::path::{Component, Path, PathBuf};
 use std::time::Duration;
 
 use suture_core::Profile;
-use suture_store::{Address, Priority};
+use suture_store::{Address, Priority, Roles, Share, Shares};
 
 use crate::bucket::address::BucketAddress;
 use crate::own_profile::OwnProfile;
@@ -25,6 +25,7 @@ pub(crate) mod command;
 pub(crate) mod events;
 pub(crate) mod keep;
 pub(crate) mod read;
+pub(crate) mod roles;
 mod shared;
 pub(crate) mod show;
 pub(crate) mod taken;
@@ -59,6 +60,8 @@ pub(crate) struct FolderConfig {
     pub leave_originals: bool,
     /// How soon files are wanted whose profile says nothing of that.
     pub priority: Priority,
+    /// Its part of the work beside other folders.
+    pub share: Share,
     /// For a result whose name is taken.
     pub on_taken: OnTaken,
 }
@@ -73,6 +76,7 @@ impl FolderConfig {
             profile: DEFAULT_PROFILE.into(),
             leave_originals: false,
             priority: Priority::default(),
+            share: Share::default(),
             on_taken: OnTaken::default(),
         }
     }
@@ -101,6 +105,8 @@ pub(crate) struct Config {
     pub state: PathBuf,
     /// The database that holds the jobs, and that other daemons share.
     pub store: Option<Address>,
+    /// What this daemon does, and leaves to no other.
+    pub roles: Roles,
     /// Small files at a time, one thread each.
     pub workers: usize,
     /// Threads for one large file.
@@ -108,6 +114,8 @@ pub(crate) struct Config {
     /// Bytes all of them together may hold.
     pub memory: u64,
     pub large: u64,
+    /// Larger files are left to other daemons; `None`: it takes files of any size.
+    pub largest: Option<u64>,
     pub reserve: u64,
     /// Rest a file needs before it is taken; `None`: by file system, and short with `--once`.
     pub settle: Option<Duration>,
@@ -139,11 +147,13 @@ impl Config {
         Self {
             state: default_state(dir),
             store: None,
+            roles: Roles::default(),
             folders: vec![FolderConfig::of(dir)],
             workers: 2,
             threads: limits.threads,
             memory: limits.memory_bytes,
             large: LARGE,
+            largest: None,
             reserve: RESERVE,
             settle: None,
             rescan: None,
@@ -171,6 +181,11 @@ impl Config {
         }
         let (memory, least) = (show_size(self.memory), show_size(least));
         Err(format!("{memory} of memory are too little for {} workers: they need {least} together", self.workers))
+    }
+
+    /// How the hot folders share the work.
+    pub(crate) fn shares(&self) -> Shares {
+        self.folders.iter().map(|folder| (folder.name.clone(), folder.share)).collect()
     }
 
     /// A profile of the configuration's, or a built-in one.

@@ -6,8 +6,8 @@ use std::time::Instant;
 
 use suture_store::job::Testimony;
 use suture_store::{
-    Claim, Control, Filter, Job, JobId, JobStore, Kind, Lease, Look, News, Notice, Page, Past, Query, Recipe, Recovered, Seq,
-    Source, State, Step, StoreError, Submission, Submitted, Time, Waiting,
+    Claim, Control, Filter, Host, Job, JobId, JobStore, Kind, Lease, Look, News, Notice, Page, Past, Query, Recipe, Recovered,
+    Seq, Shares, Source, State, Station, Step, StoreError, Submission, Submitted, Time, Waiting,
 };
 
 use crate::event::Happening;
@@ -82,6 +82,10 @@ impl JobStore for Heard {
 
     fn shut(&self, folders: &BTreeSet<String>) {
         self.store.shut(folders);
+    }
+
+    fn share(&self, shares: &Shares) {
+        self.store.share(shares);
     }
 
     fn heartbeat(&self, claim: &Claim) -> Result<Lease, StoreError> {
@@ -193,5 +197,21 @@ impl JobStore for Heard {
 
     fn hear(&self, news: Arc<dyn Fn() + Send + Sync>) {
         self.store.hear(news);
+    }
+
+    fn hosts(&self) -> Result<Vec<Host>, StoreError> {
+        self.read(self.store.hosts())
+    }
+
+    fn announce(&self, station: &Station) {
+        self.store.announce(station);
+    }
+
+    fn drain(&self, name: &str, drains: bool) -> Result<bool, StoreError> {
+        self.write(|store| store.drain(name, drains))
+    }
+
+    fn is_draining(&self) -> Result<bool, StoreError> {
+        self.read(self.store.is_draining())
     }
 }

@@ -5,11 +5,12 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, PoisonError};
 
 use serde::{Deserialize, Serialize};
-use suture_store::{Job, JobId, JobStore, Kind, Look, Query, StoreError, Time};
+use suture_store::{Host, Job, JobId, JobStore, Kind, Look, Query, Roles, StoreError, Time};
 
 use crate::attempt::Context;
 use crate::course::show_whole;
 use crate::folder::Folder;
+use crate::hosts;
 use crate::say::plain;
 use crate::schedule::{Hold, Standing};
 use crate::units::{show_count, show_when};
@@ -42,6 +43,12 @@ pub(crate) struct Glance {
     pub review: Vec<Job>,
     pub folders: Vec<Served>,
     pub store_bytes: u64,
+    /// What this daemon does.
+    #[serde(default)]
+    pub roles: Roles,
+    /// The daemons that share its store, if others can.
+    #[serde(default)]
+    pub hosts: Vec<Host>,
 }
 
 /// A job in work.
@@ -113,6 +120,8 @@ impl Glance {
             review: of(vec![Kind::NeedsReview], NAMED)?,
             folders: folders(context),
             store_bytes: size_of(&config.state),
+            roles: config.roles,
+            hosts: store.hosts()?,
         })
     }
 
@@ -196,7 +205,9 @@ pub(crate) fn standing(context: &Context) -> Result<Standing, StoreError> {
         Ok(format!("the webhook `{name}` has not heard of {events}: {why}"))
     };
     let untold = context.pulse.all_troubles().into_iter().map(words).collect::<Result<_, StoreError>>()?;
-    Ok(Standing { away, full, untold, ..context.schedule.standing() })
+    let folders: Vec<String> = context.folders.iter().map(|folder| folder.name.clone()).collect();
+    let stranded = hosts::stranded(&*context.store, &hosts::all(context)?, &folders)?;
+    Ok(Standing { away, full, untold, stranded, ..context.schedule.standing() })
 }
 
 /// That the job database does not answer, and since when, in words.

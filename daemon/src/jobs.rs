@@ -86,11 +86,12 @@ pub(crate) fn run(args: &JobsArgs) -> Exit {
 
 /// The troubles that keep a daemon from work, in lines.
 fn trouble(dir: &Path) -> String {
-    let Standing { held, away, full, untold, .. } = standing(dir);
+    let Standing { held, away, full, untold, stranded, .. } = standing(dir);
     let mut text: String = held.iter().map(|why| format!("nothing new is taken: {why}\n")).collect();
     text.extend(untold.iter().map(|who| format!("not told yet: {}\n", plain(who))));
     text.extend(away.iter().map(|why| format!("out of reach: {}\n", plain(why))));
     text.extend(full.iter().map(|why| format!("disk full: {}\n", plain(why))));
+    text.extend(stranded.iter().map(|what| format!("no host for it: {}\n", plain(what))));
     text
 }
 

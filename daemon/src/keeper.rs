@@ -9,10 +9,9 @@ use std::time::{Duration, Instant, SystemTime};
 
 use crossbeam::channel::{Receiver, RecvTimeoutError};
 use suture_store::job::{Area, Kind};
-use suture_store::{Control, Job, JobId, Query, StoreError, Submission, crash_point};
+use suture_store::{Control, Job, JobId, Query, Role, StoreError, Submission, crash_point};
 
 use crate::attempt::{Context, Event};
-use crate::deliver;
 use crate::event::Happening;
 use crate::folder::Folder;
 use crate::fsx;
@@ -23,14 +22,15 @@ use crate::past::each_job;
 use crate::publish_error::PublishError;
 use crate::scan::Reconciler;
 use crate::sentinel::Answer;
-use crate::settings::Reload;
 use crate::settle::Rest;
 use crate::signals::Stop;
 use crate::taking::take;
 
+mod farm;
 pub(crate) mod intake;
 mod news;
 mod once;
+mod reload;
 mod room;
 
 use news::{Nights, Told};
@@ -54,6 +54,7 @@ pub(crate) struct Keeper {
     folders: Vec<Kept>,
     handed: Vec<Handed>,
     disk_looked: Option<Instant>,
+    farm_looked: Option<Instant>,
     nights: Nights,
     /// It was within the hours of work at the last look.
     is_open: bool,
@@ -115,7 +116,7 @@ impl Keeper {
             folders.push(kept);
         }
         let (nights, context, stop) = (Nights::new(context), Arc::clone(context), stop.clone());
-        Self { context, inbox, stop, folders, handed: Vec::new(), disk_looked: None, nights, is_open: true }
+        Self { context, inbox, stop, folders, handed: Vec::new(), disk_looked: None, farm_looked: None, nights, is_open: true }
     }
 
     /// Keeps the folders until there is a reason to end.
@@ -137,9 +138,12 @@ impl Keeper {
     pub(crate) fn begin(&mut self, raise: Raise) -> Result<(), StoreError> {
         self.look_at_clock();
         raise(self.context.settings.now().workers)?;
-        self.remember_live()?;
-        self.remember_past()?;
-        self.forget_noticed()?;
+        // All jobs are read for it, which is for nothing where drops are looked for elsewhere.
+        if !self.folders.is_empty() {
+            self.remember_live()?;
+            self.remember_past()?;
+            self.forget_noticed()?;
+        }
         if self.context.once {
             self.hasten_waiting()?;
         }
@@ -178,7 +182,10 @@ impl Keeper {
         self.context.pulse.beat();
         self.look_at_disk(now)?;
         self.look_at_clock();
-        self.nights.look(&self.context, now)?;
+        self.look_at_farm(now)?;
+        if self.context.has(Role::Control) {
+            self.nights.look(&self.context, now)?;
+        }
         for kept in &mut self.folders {
             kept.turn(&self.context, now)?;
         }
@@ -240,37 +247,6 @@ impl Keeper {
     fn remember_past(&mut self) -> Result<(), StoreError> {
         let (now, folders) = (self.context.world.steady(), &mut self.folders);
         each_job(&*self.context.store, &mut |job| folders.iter_mut().for_each(|kept| kept.remember(job, now)))
-    }
-
-    /// The configuration was read anew: what of it the keeper works by, and what may go on now. Says what came of it, in one line.
-    fn go_by(&mut self, reload: Reload) -> Result<(), StoreError> {
-        match reload {
-            Reload::NoFile => tracing::warn!("SIGHUP changes nothing: this daemon was started without a configuration file."),
-            Reload::Refused(reason) => {
-                tracing::error!(reason, "The configuration was read anew and not taken over; the one before stays in force.");
-            }
-            Reload::Done(changes) => {
-                for kept in &mut self.folders {
-                    (kept.reconciler.rest, kept.rescan) = pace(&self.context, kept.polled);
-                }
-                self.disk_looked = None;
-                deliver::subscribe(&self.context)?;
-                // Whoever mended a setting need not wait for the next try.
-                self.hasten_waiting()?;
-                let changes = if changes.is_empty() { "none".into() } else { changes.join(", ") };
-                tracing::info!(changes, "The configuration was read anew and is in force.");
-            }
-        }
-        Ok(())
-    }
-
-    /// What waits is tried now: with `--once`, whoever starts a run may have put right what it waits for, and no other run may follow.
-    fn hasten_waiting(&self) -> Result<(), StoreError> {
-        for job in self.context.store.list(&Query { kinds: vec![Kind::Waiting], ..Query::default() })? {
-            control(&self.context, job.id, Control::Hasten)?;
-        }
-        self.context.schedule.news();
-        Ok(())
     }
 
     /// Files that were noticed in an earlier life and are gone now.

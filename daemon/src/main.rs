@@ -30,6 +30,7 @@ mod event_bus;
 mod event_metrics;
 mod event_store;
 mod exit;
+mod farm;
 mod fence;
 mod fill_curves;
 mod folder;
@@ -39,6 +40,7 @@ mod glance;
 mod ground;
 mod handed;
 mod hints;
+mod hosts;
 mod html;
 mod item;
 mod jobs;
@@ -141,6 +143,7 @@ fn main() -> ExitCode {
         Command::Retention(args) => retention::command::run(&args.file, &jobs::all),
         Command::Jobs(args) => jobs::run(args),
         Command::Store(args) => store::run(args),
+        Command::Hosts(args) => farm::run(args),
         Command::Status(args) => status::run(args),
         Command::Top(args) => status::top::run(args),
         Command::Completions(args) => manual::completions(args),

@@ -3,6 +3,7 @@
 //! While a daemon starts it has the store and does not answer yet, and while one ends, or a worker outlives a killed one, the store is
 //! held for a moment longer than anyone answers. Whoever asks then waits for [`PATIENCE`], and asks again.
 
+use std::collections::BTreeSet;
 use std::ffi::OsString;
 use std::io::{self, ErrorKind};
 use std::os::unix::ffi::OsStringExt;
@@ -20,7 +21,7 @@ use crate::fsx;
 use crate::glance::{Glance, Work};
 use crate::schedule::Standing;
 use crate::shared::{daemon_name, noted, visit};
-use crate::{standstill, watch, watchdog};
+use crate::{hosts, standstill, watch, watchdog};
 
 /// How long a store that is held while no one answers is waited for.
 const PATIENCE: Duration = Duration::from_secs(10);
@@ -144,7 +145,7 @@ pub(crate) fn daemon(dir: &Path, wish: &DaemonWish) -> Result<Option<Standing>, 
 /// When `dir` is no hot folder, or neither a daemon answers nor the store can be read.
 pub(crate) fn glance(dir: &Path, store: Option<&Address>) -> Result<Glance, Failure> {
     if let Some(address) = store {
-        return Ok(Glance::of_jobs(shared_jobs(address, &JobsWish::List)?, Vec::new(), None));
+        return shared_glance(address);
     }
     let jobs = match daemon_or_store(dir, &GlanceWish, &JobsWish::List)? {
         Answered::Daemon(glance) => return Ok(glance),
@@ -153,6 +154,15 @@ pub(crate) fn glance(dir: &Path, store: Option<&Address>) -> Result<Glance, Fail
     let state = state_of(dir).map_err(|error| unseen(dir, &error))?;
     let paused = standstill::is_set(&state).map_err(|error| unseen(&state, &error))?;
     Ok(Glance::of_jobs(jobs, paused.then(|| standstill::WORDS.into()).into_iter().collect(), Some(&state)))
+}
+
+fn shared_glance(address: &Address) -> Result<Glance, Failure> {
+    let store = visit(address, &daemon_name(Path::new(".")))?;
+    let hosts = store.hosts()?;
+    let folders: BTreeSet<&String> = hosts.iter().flat_map(|host| &host.folders).collect();
+    let stranded = hosts::stranded(&*store, &hosts, &folders.into_iter().cloned().collect::<Vec<_>>())?;
+    let glance = Glance::of_jobs(answer(&*store, &JobsWish::List)?, Vec::new(), None);
+    Ok(Glance { hosts, standing: Standing { stranded, ..glance.standing }, ..glance })
 }
 
 /// The jobs that the daemon of a hot folder has in work; none, if none runs.

@@ -14,6 +14,7 @@ use std::time::{Duration, Instant};
 use serde::{Deserialize, Serialize};
 use suture_store::{Filter, JobStore, Priority, StoreError, Waiting};
 
+use crate::config::Config;
 use crate::world::World;
 
 /// However many small files of its priority come, one that runs alone has a turn this often.
@@ -41,12 +42,29 @@ impl Turn {
     }
 
     /// As the store takes it.
-    pub(crate) fn filter(self, large: u64) -> Filter {
+    pub(crate) fn filter(self, sizes: Sizes) -> Filter {
+        let Sizes { large, largest } = sizes;
         match self {
-            Self::Small | Self::Stop => Filter { size: (0, large.saturating_sub(1)), alone: false },
-            Self::Large => Filter { size: (large, u64::MAX), alone: false },
-            Self::Alone => Filter { size: (0, u64::MAX), alone: true },
+            Self::Small | Self::Stop => Filter { size: (0, large.saturating_sub(1).min(largest)), alone: false },
+            Self::Large => Filter { size: (large, largest), alone: false },
+            Self::Alone => Filter { size: (0, largest), alone: true },
         }
+    }
+}
+
+/// How sizes of files decide who takes them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Sizes {
+    /// From this size on a file is worked on alone.
+    pub large: u64,
+    /// Beyond this size it is left to other daemons.
+    pub largest: u64,
+}
+
+impl Sizes {
+    /// As the configuration has them.
+    pub(crate) fn of(config: &Config) -> Self {
+        Self { large: config.large, largest: config.largest.unwrap_or(u64::MAX) }
     }
 }
 
@@ -57,6 +75,8 @@ pub(crate) enum Hold {
     Disk,
     /// An operator wants it so.
     Operator,
+    /// An operator wants it so, and has said it to the store that daemons share.
+    Drain,
 }
 
 /// What keeps the daemon from work, and how much it does all the same.
@@ -75,6 +95,9 @@ pub(crate) struct Standing {
     /// Who could not be told of ends of jobs yet, in words.
     #[serde(default)]
     pub untold: Vec<String>,
+    /// What waits for a host that is not there, in words.
+    #[serde(default)]
+    pub stranded: Vec<String>,
 }
 
 /// Turns of all slots.
@@ -92,7 +115,7 @@ struct State {
     /// One of them wants no company.
     alone: bool,
     /// By [`Hold`]: why nothing is given out, in words.
-    held: [Option<String>; 2],
+    held: [Option<String>; 3],
     /// So many slots may compute.
     most: usize,
     stop: bool,
@@ -110,12 +133,15 @@ pub(crate) struct Waits {
 }
 
 impl Waits {
-    /// As the store has it. `large`: from this size on a file is worked on alone.
+    /// As the store has it.
     ///
     /// # Errors
     /// As the store's.
-    pub(crate) fn of(store: &dyn JobStore, large: u64) -> Result<Self, StoreError> {
-        let of = |turn: Turn| store.waiting(&turn.filter(large));
+    pub(crate) fn of(store: &dyn JobStore, sizes: Sizes) -> Result<Self, StoreError> {
+        let of = |turn: Turn| {
+            let want = turn.filter(sizes);
+            if want.size.0 <= want.size.1 { store.waiting(&want) } else { Ok(None) }
+        };
         Ok(Self { parked: store.has_parked()?, small: of(Turn::Small)?, large: of(Turn::Large)?, alone: of(Turn::Alone)? })
     }
 }
@@ -123,7 +149,8 @@ impl Waits {
 impl Schedule {
     pub(crate) fn new(world: Arc<dyn World>) -> Self {
         let last_alone = world.steady();
-        let state = State { busy: 0, computing: 0, alone: false, held: [None, None], most: usize::MAX, stop: false, last_alone };
+        let state =
+            State { busy: 0, computing: 0, alone: false, held: [None, None, None], most: usize::MAX, stop: false, last_alone };
         Self { state: Mutex::new(state), wake: Condvar::new(), world }
     }
 
@@ -347,6 +374,19 @@ mod tests {
         s.computed();
         [Turn::Small; 2].into_iter().for_each(|turn| s.done(turn));
         assert_eq!(next(&s, waits(0, 5, 0)), Turn::Large);
+    }
+
+    /// Whatever its turn, a daemon asks for no file that it leaves to others, and for each size that it takes.
+    #[test]
+    fn larger_files_are_left_to_others() {
+        for (largest, expected) in [
+            (u64::MAX, [(0, 99), (100, u64::MAX), (0, u64::MAX)]),
+            (500, [(0, 99), (100, 500), (0, 500)]),
+            (7, [(0, 7), (100, 7), (0, 7)]),
+        ] {
+            let sizes = Sizes { large: 100, largest };
+            assert_eq!([Turn::Small, Turn::Large, Turn::Alone].map(|turn| turn.filter(sizes).size), expected);
+        }
     }
 
     #[test]

@@ -5,11 +5,13 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 use std::sync::{Arc, PoisonError, RwLock};
 
+use suture_store::Role;
+
 use crate::bucket::address::BucketAddress;
 use crate::cli::WatchArgs;
 use crate::config::api::Api;
 use crate::config::taken::OnTaken;
-use crate::config::{BucketConfig, Config, FolderConfig, read, real, show};
+use crate::config::{BucketConfig, Config, FolderConfig, read, real, roles, show};
 use crate::signals::Hangup;
 
 /// The configuration in force, and where it comes from.
@@ -88,14 +90,27 @@ fn from_args(args: &WatchArgs) -> Result<Config, String> {
     config.memory = args.memory.unwrap_or(config.memory);
     config.workers = args.workers.map_or(config.workers, usize::from);
     config.threads = args.threads.map_or(config.threads, usize::from);
+    config.largest = args.largest.or(config.largest);
     config.settle = args.settle.or(config.settle);
     config.store = args.store.clone().or(config.store);
+    config.roles = args.roles.unwrap_or(config.roles);
     config.check_memory()?;
+    roles::check(&config)?;
+    if args.once && !config.roles.are_all() {
+        return Err(format!(
+            "--once waits for the end of all work, which a daemon with the roles {} leaves to others; leave it out",
+            config.roles
+        ));
+    }
     if let Some(listen) = args.listen {
+        if !config.roles.has(Role::Control) {
+            return Err(format!("--listen is for the role control, and this daemon has {}; leave one of them out", config.roles));
+        }
         let api = config.api.take().unwrap_or_else(|| Api::at(listen));
         config.api = Some(Api { listen, ..api });
     }
     config.api.as_ref().map_or(Ok(()), Api::check)?;
+    roles::narrow(&mut config);
     Ok(config)
 }
 
@@ -107,6 +122,9 @@ fn fixed(old: &Config, new: &Config) -> Vec<String> {
     }
     if old.store != new.store {
         fixed.push("`store`".to_owned());
+    }
+    if old.roles != new.roles {
+        fixed.push("`roles`".to_owned());
     }
     if old.api != new.api {
         fixed.push("`[api]`".to_owned());
@@ -136,6 +154,9 @@ fn changes(old: &Config, new: &Config) -> Vec<String> {
         let was = old.folders.iter().find(|known| known.name == folder.name).map_or(folder.priority, |known| known.priority);
         if was != folder.priority {
             changes.push(format!("the priority of folder {} {was} -> {}", folder.name, folder.priority));
+        }
+        if old.folders.iter().any(|known| known.name == folder.name && known.share != folder.share) {
+            changes.push(format!("the share of folder {}", folder.name));
         }
     }
     if old.events != new.events {

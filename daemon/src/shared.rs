@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 #[cfg(feature = "postgres")]
 use suture_store::transfer::SharedStore;
-use suture_store::{Address, JobStore, Opening, SledStore, StateLock, StoreError};
+use suture_store::{Address, JobStore, Opening, SledStore, StateLock, Station, StoreError};
 
 use crate::config::{Config, real};
 use crate::{create, fsx};
@@ -49,8 +49,7 @@ pub(crate) fn open(config: &Config) -> Result<Opened, StoreError> {
             "The jobs that this folder holds are not read; `suture store export` and `import` move them into the database."
         );
     }
-    let folders = config.folders.iter().map(|folder| folder.name.clone()).collect();
-    let store = connect(address, &daemon_name(&config.state), folders)?;
+    let store = connect(address, config)?;
     note(&config.state, Some(address)).map_err(unread(&config.state))?;
     Ok(Opened { store, opening: Opening::default(), _lock: Some(lock) })
 }
@@ -67,9 +66,25 @@ pub(crate) fn has_jobs(state: &Path) -> bool {
 
 /// The name of a daemon in a shared store: one at a time has this state folder on this machine.
 pub(crate) fn daemon_name(state: &Path) -> String {
-    let host = std::fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default();
     let state = std::path::absolute(real(state)).unwrap_or_else(|_| state.to_owned());
-    format!("{}:{}", host.trim(), state.display())
+    format!("{}:{}", host_name(), state.display())
+}
+
+fn host_name() -> String {
+    std::fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default().trim().to_owned()
+}
+
+/// What a daemon of this process tells others of itself.
+pub(crate) fn station(config: &Config) -> Station {
+    Station {
+        host: host_name(),
+        pid: std::process::id(),
+        version: env!("CARGO_PKG_VERSION").into(),
+        roles: config.roles,
+        workers: u32::try_from(config.workers).unwrap_or(u32::MAX),
+        memory: config.memory,
+        largest: config.largest,
+    }
 }
 
 fn note_in(state: &Path) -> PathBuf {
@@ -97,10 +112,13 @@ pub(crate) fn note(state: &Path, address: Option<&Address>) -> io::Result<()> {
 }
 
 #[cfg(feature = "postgres")]
-fn connect(address: &Address, daemon: &str, folders: Vec<String>) -> Result<Arc<dyn JobStore>, StoreError> {
+fn connect(address: &Address, config: &Config) -> Result<Arc<dyn JobStore>, StoreError> {
     use suture_store::{PostgresStore, Shared};
-    let shared = Shared { folders: Some(folders), ..Shared::new(address.exposed(), daemon) };
-    Ok(Arc::new(PostgresStore::open(&shared)?))
+    let folders = Some(config.folders.iter().map(|folder| folder.name.clone()).collect());
+    // What lies in a bucket lies on no machine more than on another.
+    let joint = config.folders.iter().filter(|folder| folder.bucket.is_some()).map(|folder| folder.name.clone()).collect();
+    let new = Shared::new(address.exposed(), &daemon_name(&config.state));
+    Ok(Arc::new(PostgresStore::open(&Shared { folders, joint, station: station(config), ..new })?))
 }
 
 /// Opens the shared store to look at it, or to say what is to become of its jobs. `daemon`: whose jobs in work it brings along by an import.

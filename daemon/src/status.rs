@@ -7,6 +7,7 @@ use suture_store::{Address, Kind, Time};
 use crate::cli::service::StatusArgs;
 use crate::exit::Exit;
 use crate::glance::{Glance, Work};
+use crate::hosts;
 use crate::jobs::Folders;
 use crate::reach;
 use crate::say::{complain, plain, print};
@@ -40,7 +41,8 @@ fn screen(dir: &Path, shared: Option<&Address>, glance: &Glance) -> String {
         (None, _) => format!("{dir}: no daemon runs; this is what its job store says\n"),
         (Some(since), reason) => {
             let how = reason.as_ref().map_or_else(|| "ready".into(), |why| format!("not ready: {}", plain(why)));
-            format!("{dir}: suture {} runs since {}, {how}\n", plain(&glance.version), show_when(since.0))
+            let roles = if glance.roles.are_all() { String::new() } else { format!(" as {}", glance.roles) };
+            format!("{dir}: suture {} runs{roles} since {}, {how}\n", plain(&glance.version), show_when(since.0))
         }
     };
     let counts = |of: fn(Kind) -> bool| {
@@ -56,7 +58,10 @@ fn screen(dir: &Path, shared: Option<&Address>, glance: &Glance) -> String {
     let away = glance.standing.away.iter().map(|why| ("out of reach", why));
     let full = glance.standing.full.iter().map(|why| ("disk full", why));
     let untold = glance.standing.untold.iter().map(|who| ("not told yet", who));
-    text.extend(held.chain(away).chain(full).chain(untold).map(|(what, why)| format!("  {what}: {}\n", plain(why))));
+    let stranded = glance.standing.stranded.iter().map(|what| ("no host for it", what));
+    text.extend(
+        held.chain(away).chain(full).chain(untold).chain(stranded).map(|(what, why)| format!("  {what}: {}\n", plain(why))),
+    );
     for folder in &glance.folders {
         let room = match folder.free_bytes {
             _ if !folder.reachable => "out of reach".to_owned(),
@@ -66,6 +71,7 @@ fn screen(dir: &Path, shared: Option<&Address>, glance: &Glance) -> String {
         let path = plain(&folder.path.display().to_string());
         text += &format!("  folder    {}: {room}  {path}\n", plain(&folder.name));
     }
+    text.extend(glance.hosts.iter().map(|host| format!("  host      {}\n", hosts::line(host))));
     if shared.is_none() {
         text += &format!("  job store {}\n", show_size(glance.store_bytes));
     }
@@ -100,7 +106,7 @@ mod tests {
     use super::*;
     use crate::glance::Served;
     use crate::schedule::Standing;
-    use suture_store::{Job, JobId, RelPath, Source};
+    use suture_store::{Host, Job, JobId, RelPath, Source, Station};
 
     fn job(name: &[u8]) -> Job {
         let (folder, profile) = ("hot".to_owned(), "default".to_owned());
@@ -131,6 +137,7 @@ mod tests {
                 away: vec!["a \u{1b}[2J mount".into()],
                 full: vec!["the disk of b".into()],
                 untold: vec!["`farm` has not heard of 3".into()],
+                stranded: vec!["job 9 waits for a host".into()],
             },
             jobs: [(Kind::Queued, 3), (Kind::Running, 1), (Kind::Done, 5), (Kind::Failed, 0)].into(),
             work: vec![work],
@@ -138,6 +145,17 @@ mod tests {
             review: vec![job(b"odd\x1b.stl")],
             folders: vec![Served { name: "hot".into(), path: "/srv/hot".into(), reachable: true, free_bytes: Some(1 << 30) }],
             store_bytes: 4096,
+            roles: "intake,control".parse().unwrap(),
+            hosts: vec![Host {
+                daemon: "b:/state".into(),
+                station: Station { roles: "worker".parse().unwrap(), ..Station::default() },
+                folders: vec!["hot".into()],
+                began: Time(1),
+                seen: Time(2),
+                is_alive: true,
+                is_draining: false,
+                running: 2,
+            }],
             ..Glance::default()
         }
     }
@@ -146,7 +164,7 @@ mod tests {
     fn all_of_it_is_on_one_screen() {
         let text = screen(Path::new("hot"), None, &glance());
         for words in [
-            "hot: suture 1 runs since 20",
+            "hot: suture 1 runs as intake,control since 20",
             ", ready\n",
             "waiting   3 queued\n",
             "in work   1 running\n",
@@ -157,6 +175,8 @@ mod tests {
             "out of reach: a ",
             "disk full: the disk of b\n",
             "not told yet: `farm` has not heard of 3\n",
+            "no host for it: job 9 waits for a host\n",
+            "  host      b:/state: alive, worker, 2 in work; ",
             "folder    hot: 1.1 GB free  /srv/hot\n",
             "ended last\n",
             "last.stl",

@@ -9,12 +9,11 @@ use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use crossbeam::channel::unbounded;
-use suture_store::job::{Kind, Testimony};
 use suture_store::patience::hurry_when;
-use suture_store::{Opening, Query, StoreError, crash_point};
+use suture_store::{Opening, Role, StoreError};
 
 use crate::again::Lives;
-use crate::attempt::{Context, IN_HAND, Slot, WITNESS, remove_work};
+use crate::attempt::Context;
 use crate::cli::WatchArgs;
 use crate::config::{Config, real};
 use crate::control::Door;
@@ -30,24 +29,25 @@ use crate::keeper::Keeper;
 use crate::keeper::intake::tend;
 use crate::manager::Manager;
 use crate::past::Unread;
-use crate::publish_error::PublishError;
 use crate::pulse::Pulse;
 use crate::retention::sweep::Sweeper;
 use crate::retention::turns::Moment;
 use crate::say::complain;
-use crate::schedule::{Hold, Schedule, Turn};
+use crate::schedule::{Hold, Schedule};
 use crate::settings::Settings;
 use crate::shared::{self, Opened};
 use crate::signals::{Hangup, Stop};
 use crate::web::Web;
 use crate::window::RunWindow;
 use crate::world::{Machine, World};
-use crate::{deliver, rebuilt, standstill, uploads, watchdog};
+use crate::{deliver, rebuilt, standstill, watchdog};
 
 mod notes;
+mod recover;
 mod threads;
 
 use notes::{note_folders, note_state};
+pub(crate) use recover::recover;
 use threads::{Slots, guarded, no_thread, thread};
 
 /// How often what is gone is looked for.
@@ -113,6 +113,7 @@ pub(crate) fn serve(settings: Settings, once: bool, stop: &Stop, may_begin_anew:
             Err(error) => return store_failed(&error),
         }
     };
+    tracing::info!(roles = %config.roles, "Beginning.");
     warn_of_hours(&config);
     note_state(&config, &folders);
     note_folders(&config, &folders);
@@ -279,7 +280,7 @@ impl Daemon {
             bus,
         });
         // Before anything can come to its end.
-        if let Err(error) = guarded(|| deliver::subscribe(&context).and_then(|()| recover(&context))) {
+        if let Err(error) = guarded(|| begin(&context)) {
             return End::Store(error);
         }
         let web = match self.web.as_ref().map(|web| web.start(&context)).transpose() {
@@ -353,9 +354,11 @@ impl Daemon {
             });
             told.unwrap_or_else(|error| context.fail(error));
         };
-        thread("deliver").spawn_scoped(scope, tell).map(drop).map_err(no_thread)?;
-        if !self.once {
-            thread("sweeper").spawn_scoped(scope, sweep).map(drop).map_err(no_thread)?;
+        if context.has(Role::Control) {
+            thread("deliver").spawn_scoped(scope, tell).map(drop).map_err(no_thread)?;
+            if !self.once {
+                thread("sweeper").spawn_scoped(scope, sweep).map(drop).map_err(no_thread)?;
+            }
         }
         Ok(())
     }
@@ -389,6 +392,15 @@ impl Daemon {
             std::thread::sleep(Duration::from_millis(10));
         }
     }
+}
+
+/// Has the store keep what is to be told, and takes up what an earlier life left, each where that is this daemon's part.
+fn begin(context: &Arc<Context>) -> Result<(), StoreError> {
+    context.store.share(&context.settings.now().shares());
+    if context.has(Role::Control) {
+        deliver::subscribe(context)?;
+    }
+    if context.has(Role::Worker) { recover(context) } else { Ok(()) }
 }
 
 /// Tells what the store met when it was opened.
@@ -437,63 +449,4 @@ pub(crate) fn sweeper(context: &Context) -> Sweeper {
 /// What time it is.
 pub(crate) fn moment(context: &Context) -> Moment {
     Moment { steady: context.world.steady(), wall: context.world.wall() }
-}
-
-/// Takes up what an earlier life left, and clears its work folders away.
-pub(crate) fn recover(context: &Arc<Context>) -> Result<(), StoreError> {
-    // What lies in a folder that is another daemon's for now tells nothing of this one's jobs.
-    let folder = |name: &str| context.folders.iter().find(|folder| folder.name == name && folder.check().is_ok());
-    let testimony = |job: &suture_store::Job| {
-        let work = job.work.and_then(|work| Some(folder(&job.source.folder)?.work(work)));
-        let there = |name: &str| work.as_ref().is_some_and(|work| fsx::exists(&work.join(name)).unwrap_or(false));
-        match () {
-            () if there(IN_HAND) => Testimony::InHand,
-            () if there(WITNESS) => Testimony::Outlived,
-            () => Testimony::None,
-        }
-    };
-    let recovered = context.store.recover(&testimony)?;
-    crash_point("daemon.recovered");
-    if !recovered.is_empty() {
-        context.bus.tell(&Happening::StoreRecovered(Recovery::Unfinished { jobs: recovered.len() }));
-    }
-    let mut slot = Slot::new(context);
-    for found in recovered {
-        if let Some(claim) = found.claim {
-            slot.finish(&claim, found.job, Turn::Alone);
-        }
-        if context.failed.lock().is_ok_and(|failed| failed.is_some()) {
-            return Ok(());
-        }
-    }
-    // Before anything is cleared away: what is under way is known by its work folder.
-    for folder in context.folders.iter().filter(|folder| folder.check().is_ok()) {
-        match context.unread.read(&*context.store, folder, &context.bus) {
-            Err(PublishError::Store(error)) => return Err(error),
-            Err(error) => tracing::error!(%error, "What an earlier job store left cannot be read; it is tried again."),
-            Ok(_) => {}
-        }
-    }
-    let held: Vec<_> = context
-        .store
-        .list(&Query {
-            kinds: Kind::ALL.into_iter().filter(|kind| kind.is_held() || *kind == Kind::Parked).collect(),
-            ..Query::default()
-        })?
-        .iter()
-        .filter_map(|job| job.work.map(|token| token.to_string()))
-        .collect();
-    for folder in context.folders.iter().filter(|folder| folder.check().is_ok()) {
-        uploads::clear(folder);
-        if context.unread.has(folder) {
-            continue;
-        }
-        // Without jobs under claim, every folder in there is a left-over.
-        for entry in std::fs::read_dir(folder.work_root()).into_iter().flatten().flatten() {
-            if !held.iter().any(|token| entry.file_name().to_str() == Some(token)) {
-                remove_work(&entry.path());
-            }
-        }
-    }
-    Ok(())
 }

@@ -23,6 +23,7 @@ mod files;
 mod flow;
 mod guard;
 mod health;
+mod hosts;
 mod intake;
 mod jobs;
 mod metrics;

@@ -13,6 +13,7 @@
 
 mod address;
 pub mod crash;
+mod host;
 pub mod id;
 pub mod job;
 mod memory;
@@ -23,6 +24,8 @@ pub mod patience;
 mod postgres;
 mod queue;
 mod record;
+mod role;
+mod share;
 mod sled_store;
 pub mod stall;
 pub mod store;
@@ -33,6 +36,7 @@ pub mod transfer;
 
 pub use address::Address;
 pub use crash::crash_point;
+pub use host::{Host, Station};
 pub use id::{Attempt, Boot, Clock, Epoch, Hash, JobId, Recipe, Seq, SystemClock, Time, Token};
 pub use job::{Decision, Ending, Job, Kind, Past, Priority, Publication, Reached, Source, State, Step, Verdict};
 pub use memory::MemoryStore;
@@ -40,6 +44,8 @@ pub use news::{News, Notice, Word};
 pub use path::RelPath;
 #[cfg(feature = "postgres")]
 pub use postgres::{PostgresStore, Shared, role};
+pub use role::{NoRole, Role, Roles};
+pub use share::{NoWeight, Share, Shares, Weight};
 pub use sled_store::{Opening, SledStore, StateLock, Verified};
 pub use store::{
     Claim, Control, Filter, JobStore, Lease, Look, Page, Query, Recovered, StoreError, Submission, Submitted, Waiting,

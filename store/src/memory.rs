@@ -8,6 +8,7 @@ use crate::id::{Clock, Epoch, JobId, Recipe, Seq, SystemClock, Time};
 use crate::job::{Job, Kind, Past, Source, Step, Testimony};
 use crate::news::{News, Notice};
 use crate::queue::Queue;
+use crate::share::Shares;
 use crate::store::{
     Claim, Control, Filter, JobStore, Lease, Look, Page, Query, Recovered, StoreError, Submission, Submitted, Waiting,
 };
@@ -132,6 +133,10 @@ impl JobStore for MemoryStore {
 
     fn shut(&self, folders: &BTreeSet<String>) {
         self.queue.shut(folders);
+    }
+
+    fn share(&self, shares: &Shares) {
+        self.queue.share(shares);
     }
 
     fn heartbeat(&self, claim: &Claim) -> Result<Lease, StoreError> {

@@ -7,7 +7,8 @@
 //! | who may step        | the holder of the row's token; a new claim, and the end of the holder's life, takes it from him           |
 //! | time                | the database's clock; what a machine says of itself is only which start of it this is                     |
 //! | leases              | end by that clock, begin anew with each step, heartbeat, and by a task of the store's own while it lives  |
-//! | a daemon's life     | a row of `lives`: a daemon of the same name that begins ends those before                                 |
+//! | a daemon's life     | a row of `lives`: a daemon of the same name that begins ends those before; it says what the daemon is     |
+//! | who tells of ends   | daemons that serve the same folders together are one teller: of those that live, the first that began     |
 //! | numbers             | of transitions: a sequence, with gaps; of jobs: the head's row, without                                   |
 //!
 //! **Errors.** While the database is away, calls wait for it and are made again, up to the store's patience; each sees for itself whether it was done
@@ -25,6 +26,7 @@ use std::time::{Duration, Instant};
 use sqlx::postgres::PgConnection;
 use tokio::runtime::Runtime;
 
+use crate::host::{Host, Station};
 #[cfg(any(test, feature = "testkit"))]
 use crate::id::Clock;
 use crate::id::{Epoch, JobId, Recipe, Seq, Time};
@@ -35,6 +37,7 @@ use crate::queue::fits;
 use crate::queue::notices::can_be_subscribers;
 use crate::queue::past::can_be_recorded;
 use crate::queue::submit::{CHUNK, can_be_taken};
+use crate::share::Shares;
 use crate::store::{
     Claim, Control, Filter, JobStore, Lease, Look, Page, Query, Recovered, StoreError, Submission, Submitted, Waiting,
 };
@@ -42,6 +45,7 @@ use crate::transfer::{Holdings, SharedStore, Transfer};
 
 mod claim;
 mod database;
+mod hosts;
 mod leases;
 mod look;
 mod marks;
@@ -58,6 +62,7 @@ mod submit;
 #[cfg(test)]
 mod tests;
 mod transfer;
+mod turns;
 
 use claim::Life;
 use database::{Again, Database, Failure, wait};
@@ -65,6 +70,7 @@ use leases::Claims;
 use open::As;
 pub use open::{Shared, role};
 use step::By;
+use turns::Folders;
 
 /// The shared [`JobStore`].
 pub struct PostgresStore {
@@ -75,6 +81,7 @@ pub struct PostgresStore {
     life: Life,
     claims: Arc<Claims>,
     shut: Mutex<Vec<String>>,
+    shares: Mutex<Shares>,
     /// Of the words that wake idle daemons.
     channel: String,
     /// Names claims among all of this life.
@@ -113,8 +120,8 @@ impl PostgresStore {
     }
 
     fn over(open::Begun { runtime, end, database, life, claims, channel }: open::Begun) -> Self {
-        let (shut, calls, looked) = (Mutex::default(), AtomicI64::new(1), Mutex::default());
-        Self { runtime: Some(runtime), end, database, life, claims, shut, channel, calls, looked }
+        let (shut, shares, calls, looked) = (Mutex::default(), Mutex::default(), AtomicI64::new(1), Mutex::default());
+        Self { runtime: Some(runtime), end, database, life, claims, shut, shares, channel, calls, looked }
     }
 
     /// Makes the store, or brings it up to date, and begins nothing: for the owner of its schema.
@@ -153,6 +160,10 @@ impl PostgresStore {
         self.shut.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
+    fn folders(&self) -> Folders {
+        Folders::new(self.folders_shut(), &self.shares.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+
     /// Is it time to look at the leases of others?
     fn is_time_to_look(&self) -> bool {
         let mut looked = self.looked.lock().unwrap_or_else(PoisonError::into_inner);
@@ -170,10 +181,10 @@ impl PostgresStore {
     }
 
     fn next(&self, want: &Filter) -> Result<Option<Claim>, StoreError> {
-        let (shut, call, tries) = (self.folders_shut(), self.calls.fetch_add(1, Ordering::Relaxed), AtomicU32::new(0));
+        let (folders, call, tries) = (self.folders(), self.calls.fetch_add(1, Ordering::Relaxed), AtomicU32::new(0));
         self.ask(async |connection| {
             let again = tries.fetch_add(1, Ordering::Relaxed) > 0;
-            claim::claim(connection, &self.life, want, &shut, call, again).await
+            claim::claim(connection, &self.life, want, &folders, call, again).await
         })
     }
 
@@ -246,12 +257,16 @@ impl JobStore for PostgresStore {
     }
 
     fn waiting(&self, want: &Filter) -> Result<Option<Waiting>, StoreError> {
-        let shut = self.folders_shut();
-        self.ask(async |connection| claim::waiting(connection, &self.life, want, &shut).await)
+        let folders = self.folders();
+        self.ask(async |connection| claim::waiting(connection, &self.life, want, &folders).await)
     }
 
     fn shut(&self, folders: &BTreeSet<String>) {
         *self.shut.lock().unwrap_or_else(PoisonError::into_inner) = folders.iter().cloned().collect();
+    }
+
+    fn share(&self, shares: &Shares) {
+        self.shares.lock().unwrap_or_else(PoisonError::into_inner).clone_from(shares);
     }
 
     fn heartbeat(&self, claim: &Claim) -> Result<Lease, StoreError> {
@@ -389,5 +404,21 @@ impl JobStore for PostgresStore {
         if let Some(runtime) = &self.runtime {
             runtime.spawn(news::listen(self.database.options(), self.channel.clone(), news));
         }
+    }
+
+    fn hosts(&self) -> Result<Vec<Host>, StoreError> {
+        self.ask(async |connection| hosts::hosts(connection, &self.life).await)
+    }
+
+    fn announce(&self, station: &Station) {
+        station.clone_into(&mut self.life.station.lock().unwrap_or_else(PoisonError::into_inner));
+    }
+
+    fn drain(&self, name: &str, drains: bool) -> Result<bool, StoreError> {
+        self.ask(async |connection| hosts::drain(connection, name, drains).await)
+    }
+
+    fn is_draining(&self) -> Result<bool, StoreError> {
+        self.ask(async |connection| hosts::is_draining(connection, &self.life).await)
     }
 }

@@ -23,6 +23,7 @@ use crate::id::{Clock, Epoch, JobId, Recipe, Seq, Time, Token};
 use crate::job::{Event, Illegal, Job, Kind, Past, Source, State, Step, Testimony};
 use crate::news::{News, Notice};
 use crate::record;
+use crate::share::Shares;
 use crate::store::{
     Claim, Control, Filter, JobStore, Lease, Look, Page, Query, Recovered, StoreError, Submission, Submitted, Waiting,
 };
@@ -43,6 +44,7 @@ mod recover;
 mod results;
 pub(crate) mod submit;
 mod transfer;
+mod turn;
 
 use files::{Files, Identity};
 use line::{Line, Now};
@@ -287,6 +289,8 @@ impl<T: Tables> JobStore for Queue<T> {
         let event = Event::Claim { epoch: head.epoch, token, boot: self.clock.boot() };
         let mut job = before.after(&event, now.wall).map_err(|source| StoreError::Illegal { id, source })?;
         job.seq = head.seq;
+        // Before it is durable: where that fails, the store begins anew, and so do turns.
+        inner.line.begin_turn(id);
         self.commit(inner, head, &[(Some(&before), &job)])?;
         self.settle(head)?;
         Ok(Some(Claim { id, token, job }))
@@ -302,6 +306,10 @@ impl<T: Tables> JobStore for Queue<T> {
 
     fn shut(&self, folders: &BTreeSet<String>) {
         self.lock().line.shut(folders);
+    }
+
+    fn share(&self, shares: &Shares) {
+        self.lock().line.share(shares);
     }
 
     fn heartbeat(&self, claim: &Claim) -> Result<Lease, StoreError> {

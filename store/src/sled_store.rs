@@ -37,6 +37,7 @@ use crate::id::{Clock, JobId, Recipe, Seq, SystemClock, Time};
 use crate::job::{Job, Kind, Past, Source, Step, Testimony};
 use crate::news::{News, Notice};
 use crate::queue::Queue;
+use crate::share::Shares;
 use crate::store::{
     Claim, Control, Filter, JobStore, Lease, Look, Page, Query, Recovered, StoreError, Submission, Submitted, Waiting,
 };
@@ -180,6 +181,10 @@ impl JobStore for SledStore {
 
     fn shut(&self, folders: &BTreeSet<String>) {
         self.queue.shut(folders);
+    }
+
+    fn share(&self, shares: &Shares) {
+        self.queue.share(shares);
     }
 
     fn heartbeat(&self, claim: &Claim) -> Result<Lease, StoreError> {

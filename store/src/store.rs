@@ -4,9 +4,11 @@ use std::collections::BTreeSet;
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use crate::host::{Host, Station};
 use crate::id::{Epoch, JobId, Recipe, Seq, Time, Token};
 use crate::job::{Decision, Event, Illegal, Job, Kind, Past, Priority, Source, Step, Testimony};
 use crate::news::{News, Notice};
+use crate::share::Shares;
 
 /// As many results alike are named as it makes sense to look at.
 pub const MOST_RESULTS: usize = 8;
@@ -26,7 +28,8 @@ pub trait JobStore: Send + Sync {
     fn submit(&self, found: &[Submission]) -> Result<Vec<Submitted>, StoreError>;
 
     /// Claims the job that is next of those that `want` allows, counting the attempt: the one of the highest priority, as it counts
-    /// after its wait ([`crate::job::AGEING_MS`]), and of these the oldest. `None` when there is none. With `want.alone` only jobs that
+    /// after its wait ([`crate::job::AGEING_MS`]), of these one of the folder whose turn it is ([`crate::Share`]), and of its own the oldest. Folders that have as
+    /// many jobs in work as they may are left out. `None` when there is none. With `want.alone` only jobs that
     /// must run alone are given; the caller sees to it that nothing else runs. A parked job whose pause is over is given to anyone,
     /// first: it needs no worker.
     ///
@@ -48,6 +51,10 @@ pub trait JobStore: Send + Sync {
 
     /// Gives no job of these hot folders out until this is said again, without them. It is forgotten with the store's end.
     fn shut(&self, folders: &BTreeSet<String>);
+
+    /// Has these hot folders share the work so, and all others as usual, until this is said again; see [`crate::Share`]. It is forgotten with the store's
+    /// end.
+    fn share(&self, shares: &Shares);
 
     /// Does the claim still hold, and does anyone want it stopped? Extends the claim where claims expire.
     ///
@@ -200,6 +207,37 @@ pub trait JobStore: Send + Sync {
     /// never is. Someone has to look now and then all the same.
     fn hear(&self, news: Arc<dyn Fn() + Send + Sync>) {
         drop(news);
+    }
+
+    /// The daemons that share the store, by name, and have given a sign lately or were not heard to end; none where no other can.
+    ///
+    /// # Errors
+    /// Store errors only.
+    fn hosts(&self) -> Result<Vec<Host>, StoreError> {
+        Ok(Vec::new())
+    }
+
+    /// What this daemon tells of itself from its next sign of life on.
+    fn announce(&self, station: &Station) {
+        let _ = station;
+    }
+
+    /// Has the daemons of this host, or the daemon of this name, claim nothing more, or claim again; durably, also over their restarts. `false`: no
+    /// daemon of the store is called so.
+    ///
+    /// # Errors
+    /// Store errors only.
+    fn drain(&self, name: &str, drains: bool) -> Result<bool, StoreError> {
+        let _ = (name, drains);
+        Ok(false)
+    }
+
+    /// Is this daemon to claim nothing?
+    ///
+    /// # Errors
+    /// Store errors only.
+    fn is_draining(&self) -> Result<bool, StoreError> {
+        Ok(false)
     }
 }
 
@@ -362,6 +400,13 @@ pub enum StoreError {
     )]
     Served { folder: String, by: String },
 
+    /// Another daemon tells of the events of a hot folder, and serves other folders than this one.
+    #[error(
+        "the events of the folder `{folder}` are told by another daemon, {by}, which serves other folders than this one: have daemons with the \
+         role `control` name the same folders, all of them in buckets, or folders of their own"
+    )]
+    Told { folder: String, by: String },
+
     /// Another daemon owns the state folder.
     #[error("{} is owned by another daemon{}", path.display(), pid.map(|pid| format!(" (process {pid})")).unwrap_or_default())]
     Locked { path: PathBuf, pid: Option<u32> },
@@ -415,7 +460,7 @@ impl StoreError {
     /// again may help), 2 for what only this call got wrong.
     pub fn exit_code(&self) -> u8 {
         match self {
-            Self::Locked { .. } | Self::Served { .. } => 73,
+            Self::Locked { .. } | Self::Served { .. } | Self::Told { .. } => 73,
             Self::Unknown(_) | Self::Illegal { .. } | Self::TooLong { .. } => 2,
             _ => 75,
         }

@@ -14,6 +14,7 @@ mod past;
 mod results;
 pub mod server;
 mod tools;
+mod turns;
 
 #[cfg(feature = "testkit")]
 pub use crate::crash::at_crash_points;
@@ -26,7 +27,7 @@ type Check = fn(&mut dyn Subject, &ManualClock) -> Result<(), StoreError>;
 /// # Panics
 /// When the store does not do what [`JobStore`] promises.
 pub fn conformance(make: &dyn Fn(Arc<dyn Clock>) -> Box<dyn Subject>) {
-    let checks: [(&str, Check); 29] = [
+    let checks: [(&str, Check); 31] = [
         ("submission is idempotent", claims::submission_is_idempotent),
         ("a file that came back is new", claims::a_file_that_came_back_is_new),
         ("what was only noticed may be wanted later", claims::what_was_only_noticed_may_be_wanted_later),
@@ -34,6 +35,8 @@ pub fn conformance(make: &dyn Fn(Arc<dyn Clock>) -> Box<dyn Subject>) {
         ("the more urgent goes first", claims::the_more_urgent_goes_first),
         ("the whole way", claims::the_whole_way),
         ("claims are fenced", claims::claims_are_fenced),
+        ("folders take turns", turns::folders_take_turns),
+        ("a folder has no more in work than it may", turns::a_folder_has_no_more_in_work_than_it_may),
         ("pauses are kept", claims::pauses_are_kept),
         ("a crash is retried once", deaths::a_crash_is_retried_once),
         ("the operator's wishes", deaths::the_operators_wishes),

@@ -9,6 +9,7 @@ pub mod edit;
 pub mod forms;
 pub mod hot;
 pub mod http;
+pub mod moto;
 pub mod openapi;
 pub mod oracle;
 pub mod place;

@@ -39,6 +39,7 @@ mod e2e {
     mod retention;
     mod reuse;
     mod review;
+    mod roles;
     mod rude;
     mod same_bytes;
     mod service;

@@ -26,6 +26,36 @@ pub(crate) struct StatusArgs {
 }
 
 #[derive(Args, Debug)]
+pub(crate) struct HostsArgs {
+    /// The store that they share
+    #[arg(long, value_name = "URL", value_parser = Address::parse, global = true)]
+    pub store: Option<Address>,
+    /// Print JSON
+    #[arg(long, global = true)]
+    pub json: bool,
+    #[command(subcommand)]
+    pub command: HostsCommand,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum HostsCommand {
+    /// List them
+    List,
+    /// Have the daemons of a host, or one daemon, finish the jobs that they have and take nothing more, also after a restart
+    Drain {
+        /// A host, or a daemon by its full name
+        #[arg(value_name = "NAME")]
+        name: String,
+    },
+    /// Have them take jobs again
+    Resume {
+        /// A host, or a daemon by its full name
+        #[arg(value_name = "NAME")]
+        name: String,
+    },
+}
+
+#[derive(Args, Debug)]
 pub(crate) struct CurvesArgs {
     /// Files of curves: IGES, STEP, or JSON of knots and control points
     #[arg(value_name = "FILE", required = true)]

@@ -2,12 +2,13 @@
 
 use std::collections::BTreeMap;
 use std::net::SocketAddr;
+use std::num::NonZeroU32;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use serde::{Deserialize, Deserializer, de};
 use suture_core::Profile;
-use suture_store::Priority;
+use suture_store::{Priority, Roles, Share, Weight};
 use toml::Spanned;
 
 use super::apart::apart;
@@ -15,6 +16,7 @@ use super::api::Api;
 use super::bucket;
 use super::events::{self, OnDoneFile, WebhookFile};
 use super::keep::{Bound, Keep};
+use super::roles;
 use super::shared::StoreFile;
 use super::taken::OnTaken;
 use super::{Config, DEFAULT_PROFILE, FolderConfig, name_of, real};
@@ -35,10 +37,12 @@ struct File {
     folders: Vec<FolderFile>,
     state: Option<PathBuf>,
     store: Option<StoreFile>,
+    roles: Option<Roles>,
     workers: Option<Count>,
     threads: Option<Count>,
     memory: Option<Size>,
     large: Option<Size>,
+    largest: Option<Size>,
     reserve: Option<Size>,
     settle: Option<TimeOrAuto>,
     rescan: Option<TimeOrAuto>,
@@ -71,6 +75,11 @@ struct FolderFile {
     /// How soon its files are wanted.
     #[serde(default)]
     priority: Priority,
+    /// How often it has its turn beside other folders.
+    #[serde(default)]
+    share: Weight,
+    /// Jobs of it in work at a time.
+    most_running: Option<NonZeroU32>,
     /// For a result whose name is taken.
     #[serde(default)]
     on_taken: OnTaken,
@@ -217,6 +226,10 @@ pub(crate) fn whole(path: &Path) -> Result<Config, String> {
         let at = ["memory", "workers"].map(|setting| place_of(&text, 0, setting)).into_iter().max().unwrap_or(0);
         format!("{}: {}", path.display(), with_line(&text, at, &what))
     })?;
+    roles::check(&config).map_err(|what| {
+        let text = std::fs::read_to_string(path).unwrap_or_default();
+        format!("{}: {}", path.display(), with_line(&text, place_of(&text, 0, "roles"), &what))
+    })?;
     Ok(config)
 }
 
@@ -234,10 +247,12 @@ fn from_text(text: &str) -> Result<Config, String> {
     }
     config.state = file.state.unwrap_or(config.state);
     config.store = file.store.map(|store| store.0);
+    config.roles = file.roles.unwrap_or_default();
     config.workers = file.workers.map_or(config.workers, |count| count.0);
     config.threads = file.threads.map_or(config.threads, |count| count.0);
     config.memory = file.memory.map_or(config.memory, |size| size.0);
     config.large = file.large.map_or(config.large, |size| size.0);
+    config.largest = file.largest.map(|size| size.0);
     config.reserve = file.reserve.map_or(config.reserve, |size| size.0);
     config.settle = file.settle.and_then(|time| time.0);
     config.rescan = file.rescan.and_then(|time| time.0);
@@ -338,7 +353,8 @@ fn folders(text: &str, of_file: &[FolderFile], config: &Config) -> Result<Vec<Fo
         }
         let (leave_originals, priority, on_taken) = (folder.leave_originals, folder.priority, folder.on_taken);
         let (path, profile) = (path.clone(), profile.to_owned());
-        folders.push(FolderConfig { name, path, bucket: None, profile, leave_originals, priority, on_taken });
+        let share = Share { weight: folder.share, most_running: folder.most_running };
+        folders.push(FolderConfig { name, path, bucket: None, profile, leave_originals, priority, share, on_taken });
     }
     apart(&folders).map_err(|(folder, what)| {
         let at = of_file.get(folder).map_or(0, |folder| folder.path.span().start);
@@ -459,6 +475,7 @@ mod tests {
                 "line 5, `listen = \"0.0.0.0:80\"`: everyone in the network reaches 0.0.0.0:80, so it needs tokens",
             ),
             ("[[folders]]\npath = \"/a\"\n[api]\nlisten = \"here\"", "line 4, `listen = \"here\"`: `here` is no address"),
+            ("[[folders]]\npath = \"/a\"\nshare = 0", "line 3, `share = 0`: a share is a whole number from 1 to 100, not 0"),
             ("[[folders]]\npath = \"/a\"\n[keep]\nhistory_jobs = 0", "line 4, `history_jobs = 0`: must be at least 1"),
         ]);
     }

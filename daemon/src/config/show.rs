@@ -43,9 +43,11 @@ pub(crate) fn values(config: &Config) -> Vec<(&'static str, Option<String>)> {
     let of_hours =
         [("run_window", quoted(&config.run_window.to_string())), ("workers_outside", config.workers_outside.to_string())];
     let of_hours = of_hours.map(|(name, value)| (name, hours.then_some(value)));
+    let largest = ("largest", config.largest.map(|size| quoted(&write_size(size))));
     always
         .map(|(name, value)| (name, Some(value)))
         .into_iter()
+        .chain([largest])
         .chain(of_hours)
         .chain(kept(&config.keep))
         .chain(web(config.api.as_ref()))
@@ -100,15 +102,17 @@ pub(crate) fn text(config: &Config) -> Result<String, String> {
     }
     text += &format!("state = {}\n", path(&config.state));
     // Without the password: such a text is shown to people.
+    text += &format!("roles = [{}]\n", config.roles.each().map(|role| quoted(role.name())).collect::<Vec<_>>().join(", "));
     text += &config.store.as_ref().map(|store| format!("store = {}\n", quoted(&store.to_string()))).unwrap_or_default();
-    for FolderConfig { name, path: root, bucket, profile, leave_originals, priority, on_taken } in &config.folders {
+    for FolderConfig { name, path: root, bucket, profile, leave_originals, priority, share, on_taken } in &config.folders {
         text += &format!(
             "\n[[folders]]\npath = {}\nname = {}\nprofile = {}\n",
             bucket.as_ref().map_or_else(|| path(root), |bucket| quoted(&bucket.address.to_string())),
             quoted(name),
             quoted(profile)
         );
-        text += &format!("leave_originals = {leave_originals}\npriority = {priority}\n");
+        text += &format!("leave_originals = {leave_originals}\npriority = {priority}\nshare = {}\n", share.weight);
+        text += &share.most_running.map(|most| format!("most_running = {most}\n")).unwrap_or_default();
         text += &format!("on_taken = {}\n", quoted(on_taken.name()));
         text += &bucket.as_ref().map(|bucket| format!("cache = {}\n", quoted(&write_size(bucket.cache)))).unwrap_or_default();
     }
@@ -153,7 +157,7 @@ fn own_profiles(profiles: &BTreeMap<String, OwnProfile>) -> Result<String, Strin
 #[cfg(test)]
 mod tests {
     use suture_core::Profile;
-    use suture_store::{Address, Priority};
+    use suture_store::{Address, Priority, Share, Weight};
 
     use super::*;
     use crate::bucket::address::BucketAddress;
@@ -197,7 +201,13 @@ mod tests {
             path: "/srv/state/buckets/far".into(),
             ..FolderConfig::of(Path::new("far"))
         };
-        let config = Config { folders: vec![far], state: "/srv/state".into(), ..Config::for_folder(Path::new("far")) };
+        let config = Config {
+            folders: vec![far],
+            state: "/srv/state".into(),
+            store: Address::parse("postgres://farm@db/jobs").ok(),
+            roles: "intake,control".parse().unwrap(),
+            ..Config::for_folder(Path::new("far"))
+        };
         assert_eq!(read_back(&config), config);
     }
 
@@ -213,12 +223,14 @@ mod tests {
             profile: "it's mine".into(),
             leave_originals: true,
             priority: Priority::HIGHEST,
+            share: Share { weight: Weight::try_from(40).unwrap(), most_running: std::num::NonZeroU32::new(3) },
             on_taken: OnTaken::Skip,
         });
         (config.run_window, config.workers_outside) = ("20:00-07:00, 12:00-13:00".parse().unwrap(), 1);
         config.night_ends = "06:30".parse().unwrap();
         (config.memory, config.large, config.reserve) = (3 << 30, 1_500_000_000, 1);
         (config.workers, config.threads, config.reuse) = (7, 3, false);
+        config.largest = Some(7 << 30);
         (config.settle, config.rescan) = (Some(Duration::from_millis(300)), Some(Duration::from_secs(90)));
         (config.drain, config.time_limit.base) = (Duration::ZERO, Duration::from_millis(1500));
         config.keep = Keep {

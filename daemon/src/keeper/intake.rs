@@ -1,12 +1,13 @@
 //! Drops in a bucket: a listing says where to look, a HEAD what is there. An object is whole at once. Each bucket has a thread of its own, so that no other
-//! folder waits for a slow one.
+//! folder waits for a slow one. A daemon that leaves drops to others looks only whether the bucket answers.
 
+use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::PoisonError;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
-use suture_store::{RelPath, Source, StoreError, Submission, crash_point};
+use suture_store::{RelPath, Role, Source, StoreError, Submission, crash_point};
 
 use super::news::Told;
 use crate::attempt::Context;
@@ -36,13 +37,22 @@ const AT_ONCE: usize = 100;
 pub(crate) fn tend(folder: &Folder, context: &Context, ended: &dyn Fn() -> bool) -> Result<(), StoreError> {
     let Some(shelf) = &folder.bucket else { return Ok(()) };
     let (mut looked, mut is_away) = (None::<Instant>, false);
-    let mut intake =
-        Intake { folder, shelf, context, ended, told: Told::default(), known: BTreeMap::new(), cleared: None, is_served: false };
+    let mut intake = Intake {
+        folder,
+        shelf,
+        context,
+        ended,
+        told: Told::default(),
+        known: BTreeMap::new(),
+        cleared: None,
+        is_served: false,
+        refused: RefCell::default(),
+    };
     while !ended() {
         let every = if is_away { LOOK_FOR } else { context.settings.now().rescan.unwrap_or(LOOK_EVERY) };
         if looked.is_none_or(|then| context.world.steady().duration_since(then) >= every) {
             let began = context.world.steady();
-            let found = intake.look();
+            let found = if context.has(Role::Intake) { intake.look() } else { intake.reach().map_err(NoAnswer::from) };
             looked = Some(context.world.steady());
             let why = match found {
                 Ok(()) => None,
@@ -70,49 +80,82 @@ struct Intake<'a> {
     is_served: bool,
     /// When objects that came to nothing were looked for last.
     cleared: Option<Instant>,
+    /// Keys of drops that the store refuses to show, which was said.
+    refused: RefCell<BTreeSet<String>>,
+}
+
+/// What a look at a key shows.
+#[derive(Debug)]
+enum Looked<S, E> {
+    Drop(S),
+    /// Nothing that could be a job.
+    Nothing,
+    /// The store does not show it, for that reason: it is looked at again.
+    Refused(E),
 }
 
 impl Intake<'_> {
-    /// Has jobs made of what is new.
-    fn look(&mut self) -> Result<(), NoAnswer> {
+    /// Does the bucket answer, and is it fit to be used?
+    fn reach(&mut self) -> Result<(), Trouble> {
         self.shelf.bucket.prove()?;
         if !std::mem::replace(&mut self.is_served, true) {
             tracing::info!(folder = %self.shelf.bucket.address(), polled = true, "Serving a hot folder.");
         }
+        // Who works there may have met an outage, and calls no more until it is over.
+        if self.shelf.bucket.trouble().is_some() { self.shelf.bucket.must_be_there() } else { Ok(()) }
+    }
+
+    /// Has jobs made of what is new.
+    fn look(&mut self) -> Result<(), NoAnswer> {
+        self.reach()?;
         let now = self.context.world.steady();
         if self.cleared.is_none_or(|then| now.duration_since(then) >= CLEAR_EVERY) {
             litter::clear(self.shelf, &*self.context.store, self.context.world.wall())?;
             self.cleared = Some(now);
             // All drops are looked at again, should a look have been told of an earlier version.
             self.known.clear();
+            self.refused.get_mut().clear();
         }
         let listed = self.shelf.bucket.list("in")?.into_iter().filter(|one| is_mesh(&one.key)).collect();
         let known = std::mem::take(&mut self.known);
-        let (known, looked) = look_through(listed, known, self.ended, &|key| Ok(self.drop_of(key)?), &|found| self.submit(found));
+        let (known, looked) = look_through(listed, known, self.ended, &|key| self.drop_of(key), &|found| self.submit(found));
         self.known = known;
         looked
     }
 
     /// The drop of that key, if there is one: a listing is not believed.
-    fn drop_of(&self, key: &str) -> Result<Option<Submission>, Trouble> {
+    fn drop_of(&self, key: &str) -> Result<Looked<Submission, NoAnswer>, NoAnswer> {
         let path = RelPath::new(key.as_bytes());
         let object = match (&path, self.shelf.bucket.stat(&format!("in/{key}"))) {
             (Ok(_), Err(Trouble::Local(error))) => Err(error.to_string()),
+            (Ok(_), Err(Trouble::Denied(reason))) => {
+                // Where the bucket itself is refused, no drop of it is shown.
+                self.shelf.bucket.must_be_there()?;
+                if self.refused.borrow_mut().insert(key.to_owned()) {
+                    tracing::warn!(
+                        key,
+                        reason,
+                        "The store does not show a drop; it is asked again, and others are taken meanwhile."
+                    );
+                }
+                return Ok(Looked::Refused(Trouble::Denied(reason).into()));
+            }
             (Ok(_), found) => Ok(found?),
             (Err(error), _) => Err(error.to_string()),
         };
         let (Ok(path), Ok(object)) = (path, &object) else {
             tracing::warn!(key, reason = object.err(), "A drop cannot be taken; give it another name.");
-            return Ok(None);
+            return Ok(Looked::Nothing);
         };
-        let Some(object) = object else { return Ok(None) };
+        let Some(object) = object else { return Ok(Looked::Nothing) };
         let settings = self.context.settings.now();
         let profile = Folder::profile_folder(&path).filter(|name| settings.profile(name).is_some());
         let profile = profile.unwrap_or_else(|| settings.folder_profile(&self.folder.name).to_owned());
         let priority = choice::priority(&settings, self.folder, &path, &profile);
         let (folder, (dev, ino)) = (self.folder.name.clone(), object.version.numbers());
         let (size, mtime_ns) = (object.version.size, object.version.mtime_ns);
-        Ok(Some(Submission { source: Source { folder, path, dev, ino, size, mtime_ns, profile }, foreign: None, priority }))
+        let source = Source { folder, path, dev, ino, size, mtime_ns, profile };
+        Ok(Looked::Drop(Submission { source, foreign: None, priority }))
     }
 
     fn submit(&self, found: &[Submission]) -> Result<(), NoAnswer> {
@@ -142,36 +185,55 @@ impl Intake<'_> {
         }
         let away = why.map(str::to_owned).into_iter().collect();
         self.context.away.lock().unwrap_or_else(PoisonError::into_inner).insert(name.clone(), away);
-        self.told.tell(self.context, name, why)
+        // Others hear of it from whoever looks for drops.
+        if self.context.has(Role::Intake) { self.told.tell(self.context, name, why) } else { Ok(()) }
     }
 }
+
+/// Looks at a key.
+type Look<'a, S, E> = &'a dyn Fn(&str) -> Result<Looked<S, E>, E>;
 
 /// Drops that have jobs, and what the listing told of their versions when they were looked at.
 type Known = BTreeMap<String, String>;
 
 /// Looks at what is new in a listing, and has jobs made of it. Only what has a job is known from then on: what was looked at before a look failed is
-/// looked at again. A daemon that is to end does not wait for the rest of many.
+/// looked at again. A drop that is not shown is in no other's way. A daemon that is to end does not wait for the rest of many.
 fn look_through<S, E>(
     listed: Vec<Listed>,
     mut known: Known,
     ended: &dyn Fn() -> bool,
-    look: &dyn Fn(&str) -> Result<Option<S>, E>,
+    look: Look<'_, S, E>,
     submit: &dyn Fn(&[S]) -> Result<(), E>,
 ) -> (Known, Result<(), E>) {
     let keys: BTreeSet<&str> = listed.iter().map(|one| one.key.as_str()).collect();
     known.retain(|key, _| keys.contains(key.as_str()));
+    let mut refused = None;
     let new: Vec<&Listed> = listed.iter().filter(|one| known.get(&one.key) != Some(&one.seen)).collect();
     for some in new.chunks(AT_ONCE) {
         if ended() {
             break;
         }
-        let found = some.iter().filter_map(|one| look(&one.key).transpose()).collect::<Result<Vec<S>, E>>();
-        if let Err(error) = found.and_then(|found| submit(&found)) {
+        let (mut found, mut settled) = (Vec::new(), Vec::new());
+        for one in some {
+            match look(&one.key) {
+                Ok(Looked::Drop(drop)) => found.push(drop),
+                Ok(Looked::Nothing) => {}
+                Ok(Looked::Refused(why)) => {
+                    refused.get_or_insert(why);
+                    continue;
+                }
+                Err(error) => return (known, Err(error)),
+            }
+            settled.push((one.key.clone(), one.seen.clone()));
+        }
+        if let Err(error) = submit(&found) {
             return (known, Err(error));
         }
-        known.extend(some.iter().map(|one| (one.key.clone(), one.seen.clone())));
+        known.extend(settled);
     }
-    (known, Ok(()))
+    // Where none is shown, that is the folder's trouble.
+    let looked = refused.filter(|_| known.is_empty()).map_or(Ok(()), Err);
+    (known, looked)
 }
 
 /// A mesh, in folders none of which is another program's.
@@ -182,7 +244,7 @@ fn is_mesh(key: &str) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use std::cell::{Cell, RefCell};
+    use std::cell::Cell;
 
     use super::*;
 
@@ -196,8 +258,9 @@ mod tests {
         let (jobs, fails) = (RefCell::new(Vec::new()), Cell::new(true));
         let look = |key: &str| match key {
             "b" if fails.get() => Err("away"),
-            "gone" => Ok(None),
-            key => Ok(Some(key.to_owned())),
+            "gone" => Ok(Looked::Nothing),
+            "secret" => Ok(Looked::Refused("hidden")),
+            key => Ok(Looked::Drop(key.to_owned())),
         };
         let submit = |found: &[String]| {
             jobs.borrow_mut().extend_from_slice(found);
@@ -213,6 +276,14 @@ mod tests {
         assert_eq!(jobs.take(), [""; 0]);
         let (known, _) = look_through(listed(&[("a", "2")]), known, &|| false, &look, &submit);
         assert_eq!((jobs.take(), known.len()), (vec!["a".to_owned()], 1), "another version");
+        let (hidden, looked) = look_through(listed(&[("secret", "1"), ("z", "1")]), Known::new(), &|| false, &look, &submit);
+        assert_eq!(
+            (looked, jobs.take(), hidden.len()),
+            (Ok(()), vec!["z".to_owned()], 1),
+            "one that is not shown is in nobody's way"
+        );
+        let (_, looked) = look_through(listed(&[("secret", "1")]), Known::new(), &|| false, &look, &submit);
+        assert_eq!(looked, Err("hidden"), "none is shown");
         let (known, looked) = look_through(all(), known, &|| false, &look, &|_: &[String]| Err("full"));
         assert_eq!(looked, Err("full"));
         let (_, looked) = look_through(all(), known, &|| true, &look, &|_: &[String]| Err("full"));

@@ -5,6 +5,8 @@ use std::sync::Arc;
 use suture_store::transfer::SharedStore;
 use suture_store::{Address, JobStore, StoreError};
 
+use crate::config::Config;
+
 fn absent(address: &str) -> StoreError {
     StoreError::Unusable {
         path: address.into(),
@@ -13,7 +15,7 @@ fn absent(address: &str) -> StoreError {
     }
 }
 
-pub(super) fn connect(address: &Address, _: &str, _: Vec<String>) -> Result<Arc<dyn JobStore>, StoreError> {
+pub(super) fn connect(address: &Address, _: &Config) -> Result<Arc<dyn JobStore>, StoreError> {
     Err(absent(&address.to_string()))
 }
 

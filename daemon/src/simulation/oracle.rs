@@ -171,7 +171,7 @@ impl Oracle {
         }
     }
 
-    /// Who has waited for as long as makes them the most urgent goes before all who came later.
+    /// Who has waited for as long as makes them the most urgent goes before all of their folder who came later; folders take turns.
     fn is_next(&self, stage: &Stage, matter: Matter) {
         let life = stage.life();
         let now = life.context.world.wall();
@@ -182,7 +182,12 @@ impl Oracle {
             return;
         }
         for job in life.store().list(&Query { kinds: vec![Kind::Queued], ..Query::default() }).unwrap() {
-            let first = job.priority >= taken.priority && job.id < taken.id && job.retried.is_none() && taken.retried.is_none();
+            let is_beside = job.source.folder == taken.source.folder;
+            let first = is_beside
+                && job.priority >= taken.priority
+                && job.id < taken.id
+                && job.retried.is_none()
+                && taken.retried.is_none();
             let ready = matches!(job.state, State::Queued { not_before: None }) && job.is_due(now) && small(&job);
             let same = taken.attempts.0 == 1;
             // Who came with the same priority, or a higher one, and sooner, is never behind.

@@ -4,7 +4,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::{Builder, Scope, ScopedJoinHandle};
 
-use suture_store::StoreError;
+use suture_store::{Role, StoreError};
 
 use crate::attempt::{Context, Slot};
 
@@ -52,7 +52,12 @@ impl<'s, 'e> Slots<'s, 'e> {
     pub(super) fn raise(&self, workers: usize) -> Result<(), StoreError> {
         let context = self.context;
         let mut threads = self.threads();
-        let most = if workers == 1 { 1 } else { 2 * workers };
+        let most = match workers {
+            // Others work.
+            _ if !context.has(Role::Worker) => 0,
+            1 => 1,
+            workers => 2 * workers,
+        };
         while threads.len() < most {
             let slot = move || {
                 let worked = guarded(|| {

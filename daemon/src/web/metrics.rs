@@ -13,6 +13,7 @@ use crate::attempt::Context;
 use crate::event_metrics::{Label, head, sample, written};
 use crate::fsx;
 use crate::glance::size_of;
+use crate::hosts;
 
 use super::ask::ask;
 use super::problem::Problem;
@@ -23,6 +24,7 @@ pub(super) async fn metrics(State(shared): State<Arc<Shared>>) -> Result<Respons
     let text = ask(&shared.context, |context| {
         let mut text = context.bus.metrics.text();
         jobs(&mut text, context)?;
+        hosts(&mut text, context)?;
         targets(&mut text, context)?;
         folders(&mut text, context);
         process(&mut text, context);
@@ -51,6 +53,19 @@ fn jobs(text: &mut String, context: &Context) -> Result<(), Problem> {
     let idle = context.settings.now().workers.saturating_sub(busy);
     let of_workers = [(vec![("state", "busy")], busy as f64), (vec![("state", "idle")], idle as f64)];
     gauge(text, ("suture_workers", "Workers in each state."), of_workers);
+    Ok(())
+}
+
+fn hosts(text: &mut String, context: &Context) -> Result<(), Problem> {
+    let all = hosts::all(context)?;
+    let of = |state: &'static str| all.iter().filter(|host| hosts::state(host) == state).count() as f64;
+    gauge(
+        text,
+        ("suture_hosts", "Daemons that share the store, in each state."),
+        hosts::STATES.map(|state| (vec![("state", state)], of(state))),
+    );
+    let works: u64 = all.iter().filter(|host| host.works()).map(|host| u64::from(host.station.workers)).sum();
+    gauge(text, ("suture_farm_workers", "Workers of all hosts that take jobs."), [(vec![], works as f64)]);
     Ok(())
 }
 

@@ -13,6 +13,7 @@ use axum::routing::{MethodRouter, get, post};
 use super::files;
 use super::guard::guard;
 use super::health::{livez, readyz};
+use super::hosts;
 use super::jobs;
 use super::metrics::metrics;
 use super::pages;
@@ -41,6 +42,9 @@ fn all() -> Vec<Route> {
         ("/v1/events", get(events)),
         ("/v1/openapi.json", get(openapi)),
         ("/v1/status", get(status)),
+        ("/v1/hosts", get(hosts::list)),
+        ("/v1/hosts/{name}/drain", post(hosts::drain)),
+        ("/v1/hosts/{name}/resume", post(hosts::resume)),
         ("/v1/jobs", get(jobs::list).post(submit)),
         ("/v1/jobs/{id}", get(jobs::show).delete(jobs::forget)),
         ("/v1/jobs/{id}/result", get(files::result)),

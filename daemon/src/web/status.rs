@@ -6,6 +6,7 @@ use std::sync::Arc;
 use axum::Json;
 use axum::extract::State;
 use serde::Serialize;
+use suture_store::Roles;
 
 use crate::attempt::Context;
 use crate::glance;
@@ -32,6 +33,10 @@ pub(super) struct Status {
     pub full: Vec<String>,
     /// Who could not be told of ends of jobs yet, in words.
     pub untold: Vec<String>,
+    /// What waits for a host that is not there, in words.
+    pub stranded: Vec<String>,
+    /// What this daemon does.
+    pub roles: Roles,
     /// How many jobs there are in each state.
     pub jobs: BTreeMap<&'static str, u64>,
     pub folders: Vec<Served>,
@@ -56,7 +61,7 @@ pub(super) async fn status(State(shared): State<Arc<Shared>>) -> Result<Json<Sta
 /// # Errors
 /// When the store does not answer.
 pub(super) fn of(context: &Context) -> Result<Status, Problem> {
-    let Standing { running, held, away, full, untold } = glance::standing(context)?;
+    let Standing { running, held, away, full, untold, stranded } = glance::standing(context)?;
     let served =
         |folder: glance::Served| Served { name: folder.name, reachable: folder.reachable, free_bytes: folder.free_bytes };
     let reason = glance::unready(context);
@@ -69,6 +74,8 @@ pub(super) fn of(context: &Context) -> Result<Status, Problem> {
         away,
         full,
         untold,
+        stranded,
+        roles: context.settings.now().roles,
         jobs: glance::counts(context)?.into_iter().map(|(kind, count)| (kind.name(), count)).collect(),
         folders: glance::folders(context).into_iter().map(served).collect(),
     })

@@ -2,7 +2,7 @@
 //! let them run out is taken back by whoever claims next.
 
 use std::path::PathBuf;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use sqlx::postgres::PgConnection;
@@ -11,6 +11,8 @@ use sqlx::{Connection, Row};
 use super::database::Failure;
 use super::row::{Columns, Stored, int, number};
 use super::step::{By, set};
+use super::turns::{Folders, alone};
+use crate::host::Station;
 use crate::id::{Clock, Epoch, Time, Token};
 use crate::job::{Event, Job, Priority, State, Testimony};
 use crate::store::{Claim, Filter, Lease, StoreError, Waiting};
@@ -31,6 +33,10 @@ const MOST_TAKEN_BACK: usize = 64;
 pub(super) struct Life {
     pub(super) epoch: Epoch,
     pub(super) daemon: String,
+    /// Under this name it tells of ends and news; daemons that serve the same folders together have one, and one of them tells.
+    pub(super) teller: String,
+    /// What it tells of itself.
+    pub(super) station: Arc<Mutex<Station>>,
     /// Only jobs of these hot folders are its business; `None`: all are.
     pub(super) folders: Option<Vec<String>>,
     /// Says which start of the machine this is, and nothing else.
@@ -61,7 +67,7 @@ pub(super) async fn claim(
     connection: &mut PgConnection,
     life: &Life,
     want: &Filter,
-    shut: &[String],
+    folders: &Folders,
     call: i64,
     again: bool,
 ) -> Result<Option<Claim>, Failure> {
@@ -69,7 +75,7 @@ pub(super) async fn claim(
         return Ok(Some(claim));
     }
     for round in 0..ROUNDS {
-        let row = sqlx::query(CLAIM)
+        let query = sqlx::query(CLAIM)
             .bind(int(life.epoch.0))
             .bind(life.machine.boot().0.cast_signed())
             .bind(call)
@@ -77,17 +83,25 @@ pub(super) async fn claim(
             .bind(int(want.size.0))
             .bind(int(want.size.1))
             .bind(want.alone)
-            .bind(shut)
-            .bind(&life.folders)
-            .fetch_one(&mut *connection)
-            .await?;
+            .bind(&folders.shut)
+            .bind(&life.folders);
+        let query = folders.bind(query);
+        let row = if folders.has_limits() {
+            let mut transaction = connection.begin().await?;
+            alone(&mut transaction).await?;
+            let row = query.fetch_one(&mut *transaction).await?;
+            transaction.commit().await?;
+            row
+        } else {
+            query.fetch_one(&mut *connection).await?
+        };
         if row.try_get::<Option<i64>, _>("id")?.is_some() {
             return Ok(Some(claim_of(Stored::read(&row)?)?));
         }
         if !row.try_get::<bool, _>("is_alive")? {
             return Err(life.over().into());
         }
-        if row.try_get::<i64, _>("candidates")? == 0 {
+        if row.try_get::<i64, _>("candidates")? == 0 || row.try_get("is_draining")? {
             return Ok(None);
         }
         tokio::time::sleep(ROUND * round).await;
@@ -114,7 +128,8 @@ pub(super) async fn take_back(connection: &mut PgConnection, life: &Life, shut: 
     for _ in 0..MOST_TAKEN_BACK {
         // Under a lock: a holder that gives a sign just now is either in time, or finds that it was too late.
         let mut transaction = connection.begin().await?;
-        let row = sqlx::query(EXPIRED).bind(life.lease).bind(shut).bind(&life.folders).fetch_optional(&mut *transaction).await?;
+        let row = sqlx::query(EXPIRED).bind(life.lease).bind(shut).bind(&life.folders).bind(int(life.epoch.0));
+        let row = row.fetch_optional(&mut *transaction).await?;
         let Some(row) = row else { return Ok(None) };
         let stored = Stored::read(&row)?;
         let now = Time(number(row.try_get("now")?));
@@ -162,16 +177,15 @@ pub(super) async fn waiting(
     connection: &mut PgConnection,
     life: &Life,
     want: &Filter,
-    shut: &[String],
+    folders: &Folders,
 ) -> Result<Option<Waiting>, Failure> {
-    let row = sqlx::query(WAITING)
+    let query = sqlx::query(WAITING)
         .bind(int(want.size.0))
         .bind(int(want.size.1))
         .bind(want.alone)
-        .bind(shut)
-        .bind(&life.folders)
-        .fetch_one(connection)
-        .await?;
+        .bind(&folders.shut)
+        .bind(&life.folders);
+    let row = folders.bind(query).fetch_one(connection).await?;
     let priority = |name| {
         let number: Option<i64> = row.try_get(name)?;
         Ok::<_, Failure>(number.and_then(|number| Priority::try_from(number).ok()))

@@ -10,6 +10,7 @@ use tokio::runtime::Runtime;
 
 use super::claim::{Life, extend};
 use super::database::{Again, Database, Failure, wait};
+use super::hosts::see;
 use super::row::int;
 use crate::id::{Epoch, JobId, Token};
 use crate::store::Claim;
@@ -37,13 +38,6 @@ impl Claims {
             claims.remove(&claim.id);
         }
     }
-}
-
-/// The daemon lives.
-async fn see(connection: &mut PgConnection, life: &Life) -> Result<(), Failure> {
-    let seen = sqlx::query("UPDATE lives SET seen = suture_now() WHERE epoch = $1 AND NOT is_over").bind(int(life.epoch.0));
-    seen.execute(connection).await?;
-    Ok(())
 }
 
 /// The daemon ends of itself: its folders are free at once.

@@ -11,9 +11,9 @@ use super::outbox::LOCKS;
 use crate::store::StoreError;
 
 /// Each with its number, from 1 on. What is written here never changes: a database remembers the digest.
-const MIGRATIONS: [&str; 1] = [include_str!("sql/schema_1.sql")];
+const MIGRATIONS: [&str; 2] = [include_str!("sql/schema_1.sql"), include_str!("sql/schema_2.sql")];
 
-fn digest(migration: &str) -> Vec<u8> {
+pub(super) fn digest(migration: &str) -> Vec<u8> {
     Sha256::digest(migration).to_vec()
 }
 

@@ -1,25 +1,29 @@
 //! Where the shared store is, and how a life of a daemon begins on it.
 
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 use std::path::PathBuf;
 use std::str::FromStr;
-use std::sync::Arc;
 use std::sync::mpsc::{Sender, channel};
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
+use sha2::{Digest, Sha256};
 use sqlx::postgres::{PgConnectOptions, PgConnection};
 use sqlx::{Connection, Row};
 use tokio::runtime::{Builder, Runtime};
 
 use super::claim::Life;
 use super::database::{Again, Database, Failure, wait};
+use super::hosts::see;
 use super::leases::{Claims, keep_leases};
-use super::marks::begin_marks;
+use super::marks::{Heir, begin_marks, succeed};
 use super::migrate::{is_current, is_plain, migrate};
 use super::row::number;
 use crate::address::Address;
+use crate::host::Station;
 use crate::id::{Clock, Epoch, SystemClock};
 use crate::patience::is_brief;
+use crate::role::Role;
 use crate::store::StoreError;
 
 /// A database that many daemons share, and who this one is.
@@ -35,6 +39,10 @@ pub struct Shared {
     /// The hot folders that it serves, by name, of which no other daemon serves one; the store then knows jobs of these alone, but for one that is
     /// asked for by its number. `None`: jobs of all folders.
     pub folders: Option<Vec<String>>,
+    /// Those of `folders` that other daemons may serve as well.
+    pub joint: BTreeSet<String>,
+    /// What it tells of itself.
+    pub station: Station,
     /// Connections at most.
     pub connections: u32,
     /// A daemon that gives no sign for so long has lost its jobs.
@@ -51,6 +59,8 @@ impl Shared {
             schema: "suture".to_owned(),
             daemon: daemon.to_owned(),
             folders: None,
+            joint: BTreeSet::new(),
+            station: Station::default(),
             connections: 8,
             lease: Duration::from_secs(60),
             patience: Duration::from_secs(300),
@@ -60,6 +70,27 @@ impl Shared {
     /// Where it is, for people, without a password.
     pub(super) fn place(&self) -> String {
         Address::parse(&self.url).map_or_else(|_| "the database".to_owned(), |address| address.to_string())
+    }
+
+    /// The hot folders that no one else may serve.
+    fn alone(&self) -> Vec<&String> {
+        self.folders.iter().flatten().filter(|folder| !self.joint.contains(*folder)).collect()
+    }
+
+    /// Who tells of its ends and news: it alone, or whoever has the same part in the same folders.
+    pub(super) fn teller(&self) -> String {
+        let tells = self.station.roles.has(Role::Control);
+        let Some(folders) = self.folders.as_ref().filter(|folders| tells && !folders.is_empty() && self.alone().is_empty())
+        else {
+            return self.daemon.clone();
+        };
+        let mut digest = Sha256::new();
+        for folder in folders.iter().collect::<BTreeSet<_>>() {
+            digest.update((folder.len() as u64).to_be_bytes());
+            digest.update(folder);
+        }
+        let name: String = digest.finalize().iter().take(16).map(|byte| format!("{byte:02x}")).collect();
+        format!("joint:{name}")
     }
 
     /// In ms.
@@ -139,8 +170,17 @@ pub(super) fn begin(shared: &Shared, as_what: As, clock: Option<Arc<dyn Clock>>)
         };
         database.call(Again::Yes, is_brief(), begin).await
     })?;
-    let (daemon, folders) = (shared.daemon.clone(), shared.folders.clone());
-    let life = Life { epoch, daemon, folders, machine, lease: shared.lease() };
+    let (daemon, folders, station) =
+        (shared.daemon.clone(), shared.folders.clone(), Arc::new(Mutex::new(shared.station.clone())));
+    // A visitor takes over what one daemon is to tell.
+    let teller = if as_what == As::Daemon { shared.teller() } else { daemon.clone() };
+    let life = Life { epoch, daemon, teller, station, folders, machine, lease: shared.lease() };
+    if as_what == As::Daemon {
+        // Whoever looks at once sees all of it.
+        wait(&runtime, async || {
+            database.call(Again::Yes, is_brief(), async |connection: &mut PgConnection| see(connection, &life).await).await
+        })?;
+    }
     let claims = Arc::new(Claims::default());
     let (end, ended) = channel();
     let keeper = (Arc::clone(&runtime), Arc::clone(&database), life.clone(), Arc::clone(&claims));
@@ -175,30 +215,57 @@ async fn begin_life(connection: &mut PgConnection, shared: &Shared, is_test: boo
     // Whoever begins at the same time waits here, and sees this life.
     super::submit::head(&mut transaction).await?;
     must_be_alone(&mut transaction, shared).await?;
-    begin_marks(&mut transaction, &shared.daemon).await?;
+    let teller = shared.teller();
+    begin_marks(&mut transaction, &teller).await?;
+    if shared.station.roles.has(Role::Control) {
+        let before = tellers_before(&mut transaction, shared).await?;
+        let heir = Heir { daemon: &shared.daemon, teller: &teller, folders: &shared.folders, lease };
+        succeed(&mut transaction, &heir, &before).await?;
+    }
     sqlx::query("UPDATE lives SET is_over = true WHERE daemon = $1").bind(&shared.daemon).execute(&mut *transaction).await?;
     // What they held is void at once; whoever does not come to recover it leaves it to others.
     let void = "UPDATE jobs SET token = NULL, lease_until = suture_now() + $2 WHERE epoch IN (SELECT epoch FROM lives WHERE daemon = $1)";
     sqlx::query(void).bind(&shared.daemon).bind(lease).execute(&mut *transaction).await?;
-    let old = "DELETE FROM lives l WHERE is_over AND NOT EXISTS (SELECT 1 FROM jobs j WHERE j.epoch = l.epoch)";
+    // One that gave no sign for a day is gone, whether it said so or not.
+    let old = "DELETE FROM lives l WHERE (is_over OR greatest(seen, suture_up_since()) + 86400000 < suture_now())
+        AND NOT EXISTS (SELECT 1 FROM jobs j WHERE j.epoch = l.epoch)";
     sqlx::query(old).execute(&mut *transaction).await?;
-    let new = "INSERT INTO lives (daemon, folders, began, seen) VALUES ($1, $2, suture_now(), suture_now()) RETURNING epoch";
-    let new = sqlx::query(new).bind(&shared.daemon).bind(&shared.folders);
+    let new = "INSERT INTO lives (daemon, folders, alone, teller, roles, began, seen) VALUES ($1, $2, $3, $4, $5, suture_now(), suture_now())
+        RETURNING epoch";
+    let roles: Vec<_> = shared.station.roles.each().map(Role::name).collect();
+    let new = sqlx::query(new).bind(&shared.daemon).bind(&shared.folders).bind(shared.alone()).bind(&teller).bind(roles);
     let epoch: i64 = new.fetch_one(&mut *transaction).await?.try_get("epoch")?;
     transaction.commit().await?;
     Ok(Epoch(number(epoch)))
 }
 
-/// Refuses where a daemon that lives serves a folder of that name. Who gave no sign while the database was away is not dead.
+/// What this daemon was told by in the lives that are known, and as one that is alone.
+async fn tellers_before(connection: &mut PgConnection, shared: &Shared) -> Result<Vec<String>, Failure> {
+    let rows = sqlx::query("SELECT DISTINCT teller FROM lives WHERE daemon = $1 AND teller IS NOT NULL").bind(&shared.daemon);
+    let rows = rows.fetch_all(connection).await?;
+    let tellers = rows.iter().map(|row| Ok(row.try_get("teller")?)).chain([Ok(shared.daemon.clone())]);
+    tellers.collect()
+}
+
+/// Refuses where a daemon that lives serves a folder of that name, unless both may serve it together; and where both would tell of it, but not of
+/// the same folders. Who gave no sign while the database was away is not dead.
 async fn must_be_alone(connection: &mut PgConnection, shared: &Shared) -> Result<(), Failure> {
-    let sql = "SELECT l.daemon, f.folder FROM lives l CROSS JOIN LATERAL unnest(l.folders) f (folder)
+    let sql = "SELECT l.daemon, f.folder, s.is_alone FROM lives l CROSS JOIN LATERAL unnest(l.folders) f (folder)
+        CROSS JOIN LATERAL (SELECT l.alone IS NULL OR f.folder = ANY (l.alone) OR f.folder = ANY ($4) AS is_alone) s
         WHERE NOT l.is_over AND l.daemon <> $1 AND f.folder = ANY ($2) AND greatest(l.seen, suture_up_since()) + $3 > suture_now()
-        ORDER BY l.epoch, f.folder LIMIT 1";
-    let other = sqlx::query(sql).bind(&shared.daemon).bind(&shared.folders).bind(shared.lease());
-    match other.fetch_optional(connection).await? {
-        Some(row) => Err(StoreError::Served { folder: row.try_get("folder")?, by: row.try_get("daemon")? }.into()),
-        None => Ok(()),
-    }
+            AND (s.is_alone OR ($6 AND 'control' = ANY (l.roles) AND l.teller <> $5))
+        ORDER BY s.is_alone DESC, l.epoch, f.folder LIMIT 1";
+    let other = sqlx::query(sql)
+        .bind(&shared.daemon)
+        .bind(&shared.folders)
+        .bind(shared.lease())
+        .bind(shared.alone())
+        .bind(shared.teller())
+        .bind(shared.station.roles.has(Role::Control));
+    let Some(row) = other.fetch_optional(connection).await? else { return Ok(()) };
+    let (folder, by) = (row.try_get("folder")?, row.try_get("daemon")?);
+    let is_alone: bool = row.try_get("is_alone")?;
+    Err(if is_alone { StoreError::Served { folder, by } } else { StoreError::Told { folder, by } }.into())
 }
 
 /// Refuses where no store was made yet.

@@ -1,5 +1,6 @@
 //! The shared store on a real database: what it promises as any store does, and what only it must.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use sqlx::{AssertSqlSafe, Connection};
@@ -10,6 +11,7 @@ use crate::testkit::{Subject, conformance};
 
 mod farm;
 mod figures;
+mod hosts;
 mod lost;
 mod order;
 mod outage;

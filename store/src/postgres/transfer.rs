@@ -102,12 +102,12 @@ async fn put_marks(transaction: &mut PgTransaction<'_>, life: &Life, marks: &Mar
         .execute(&mut **transaction)
         .await?;
     sqlx::query("DELETE FROM daemons").execute(&mut **transaction).await?;
-    begin_marks(transaction, &life.daemon).await?;
+    begin_marks(transaction, &life.teller).await?;
     sqlx::query("DELETE FROM subscribers").execute(&mut **transaction).await?;
     sqlx::query("DELETE FROM away").execute(&mut **transaction).await?;
     for (name, heard) in &marks.subscribers {
         let sql = "INSERT INTO subscribers (daemon, name, heard) VALUES ($1, $2, $3)";
-        sqlx::query(sql).bind(&life.daemon).bind(name).bind(int(heard.0)).execute(&mut **transaction).await?;
+        sqlx::query(sql).bind(&life.teller).bind(name).bind(int(heard.0)).execute(&mut **transaction).await?;
     }
     for (folder, since) in &marks.away {
         let sql = "INSERT INTO away (folder, since) VALUES ($1, $2)";
@@ -120,7 +120,7 @@ async fn put_notices(transaction: &mut PgTransaction<'_>, life: &Life, notices: 
     for notice in notices {
         let job = match notice {
             Notice::Word(word) => {
-                outbox::put(transaction, &life.daemon, word).await?;
+                outbox::put(transaction, &life.teller, word).await?;
                 continue;
             }
             Notice::End(job) => job,

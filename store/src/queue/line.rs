@@ -1,7 +1,7 @@
 //! Who is next: every job that may be claimed, in memory, in the order in which it is its turn.
 //!
-//! **Order.** Parked jobs whose pause is over first: there is little to do for them. Then the higher priority, and of one priority the
-//! lower number, which is the older job.
+//! **Order.** Parked jobs whose pause is over first: there is little to do for them. Then the higher priority; of one priority the folder whose turn it is
+//! ([`crate::share`]), and of one folder, or of folders whose turns begin together, the lower number, which is the older job.
 //!
 //! **Ageing.** A job counts for one step of priority more after each [`AGEING_MS`] since it was dropped (or retried), up to the highest: so
 //! it is behind fewer and fewer others, and no flood of urgent files keeps it waiting for ever. Its age is counted by a clock that only
@@ -12,8 +12,10 @@ use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::index::class;
+use super::turn::Turns;
 use crate::id::{JobId, Time};
 use crate::job::{AGEING_MS, BACKOFF_CAP_MS, Job, Kind, Priority};
+use crate::share::Shares;
 use crate::store::{Filter, Waiting};
 
 /// Longest age that makes a difference.
@@ -115,6 +117,7 @@ struct Folder {
     /// By their own priority, and by what they count as.
     by_base: Order,
     by_aged: Order,
+    turns: Turns,
 }
 
 /// All jobs that are not at rest.
@@ -125,6 +128,10 @@ pub(super) struct Line {
     folders: Vec<Folder>,
     /// Names of folders of which no job is claimed, those without a job too.
     shut: BTreeSet<String>,
+    /// Of folders of which something is said.
+    shares: Shares,
+    /// When the latest turn of any folder began.
+    latest: u64,
     /// When a ready one counts for one step more.
     rises: BTreeSet<(u64, JobId)>,
     resting: BTreeSet<(Time, JobId)>,
@@ -159,7 +166,8 @@ impl Line {
 
     fn folder(&mut self, name: &str) -> usize {
         self.folders.iter().position(|folder| folder.name == name).unwrap_or_else(|| {
-            self.folders.push(Folder { name: name.to_owned(), ..Folder::default() });
+            let turns = Turns::of(self.shares.get(name).copied().unwrap_or_default());
+            self.folders.push(Folder { name: name.to_owned(), turns, ..Folder::default() });
             self.folders.len() - 1
         })
     }
@@ -169,8 +177,25 @@ impl Line {
         self.shut.clone_from(folders);
     }
 
+    /// Has folders share the work so.
+    pub(super) fn share(&mut self, shares: &Shares) {
+        self.shares.clone_from(shares);
+        for folder in &mut self.folders {
+            folder.turns.share = shares.get(&folder.name).copied().unwrap_or_default();
+        }
+    }
+
+    /// The job is about to be claimed: its folder has its turn, unless there is nothing to compute.
+    pub(super) fn begin_turn(&mut self, id: JobId) {
+        let Some(entry) = self.entries.get(&id).filter(|entry| !matches!(entry.place, Place::Parked(_))) else { return };
+        if let Some(folder) = self.folders.get_mut(entry.folder) {
+            self.latest = folder.turns.begin(self.latest);
+        }
+    }
+
+    /// Folders of which a job may be claimed.
     fn open(&self) -> impl Iterator<Item = &Folder> {
-        self.folders.iter().filter(|folder| !self.shut.contains(&folder.name))
+        self.folders.iter().filter(|folder| !self.shut.contains(&folder.name) && folder.turns.has_room())
     }
 
     /// Is it a job of a folder that is open?
@@ -181,7 +206,7 @@ impl Line {
 
     fn enter(&mut self, id: JobId, entry: &Entry, ticks: u64) {
         match entry.place {
-            Place::Held => {}
+            Place::Held => self.folders.get_mut(entry.folder).into_iter().for_each(|folder| folder.turns.held += 1),
             Place::Ready => {
                 if let Some(folder) = self.folders.get_mut(entry.folder) {
                     folder.by_base.0.insert(Order::key(id, entry, entry.base), entry.size);
@@ -198,7 +223,11 @@ impl Line {
 
     fn leave(&mut self, id: JobId, entry: &Entry) {
         match entry.place {
-            Place::Held => {}
+            Place::Held => self
+                .folders
+                .get_mut(entry.folder)
+                .into_iter()
+                .for_each(|folder| folder.turns.held = folder.turns.held.saturating_sub(1)),
             Place::Ready => {
                 if let Some(folder) = self.folders.get_mut(entry.folder) {
                     folder.by_base.0.remove(&Order::key(id, entry, entry.base));
@@ -234,9 +263,12 @@ impl Line {
         if let Some(id) = self.unparked(now) {
             return Some(id);
         }
-        let rested = self.rested(want, now).map(|(id, entry)| (entry.aged(now.ticks), id));
-        let all = rested.chain(self.open().filter_map(|folder| folder.by_aged.first(want)));
-        all.max_by_key(|(priority, id)| (*priority, Reverse(*id))).map(|(_, id)| id)
+        let turn = |folder: &Folder| Reverse(folder.turns.next(self.latest));
+        let rested = self
+            .rested(want, now)
+            .filter_map(|(id, entry)| Some((entry.aged(now.ticks), turn(self.folders.get(entry.folder)?), Reverse(id))));
+        let ready = |folder: &Folder| folder.by_aged.first(want).map(|(priority, id)| (priority, turn(folder), Reverse(id)));
+        rested.chain(self.open().filter_map(ready)).max().map(|(_, _, Reverse(id))| id)
     }
 
     /// May a parked job be tried again?
@@ -258,9 +290,11 @@ impl Line {
         highest.map(|(highest, aged)| Waiting { highest, aged })
     }
 
-    /// Jobs whose pause is over, of folders that are open.
+    /// Jobs whose pause is over, of folders of which one may be claimed.
     fn rested(&self, want: &Filter, now: Now) -> impl Iterator<Item = (JobId, &Entry)> {
-        let entry = |(_, id): &(Time, JobId)| Some((*id, self.entries.get(id).filter(|_| self.is_open(*id))?));
+        let has_room = |entry: &&Entry| self.folders.get(entry.folder).is_some_and(|folder| folder.turns.has_room());
+        let entry =
+            move |(_, id): &(Time, JobId)| Some((*id, self.entries.get(id).filter(has_room).filter(|_| self.is_open(*id))?));
         over(&self.resting, now.wall).filter_map(entry).filter(|(_, entry)| entry.fits(want))
     }
 }
@@ -285,6 +319,7 @@ fn over(pauses: &BTreeSet<(Time, JobId)>, now: Time) -> impl Iterator<Item = &(T
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::share::{Share, Weight};
     use crate::testkit::dropped;
 
     fn at(ms: u64) -> Now {
@@ -421,5 +456,34 @@ mod tests {
         patient.state = crate::job::State::Cancelled { why: crate::job::Withdrawal::Operator };
         line.update(&patient, at(AGEING_MS + 8));
         assert!(line.entries.is_empty() && line.rises.is_empty());
+    }
+
+    /// However the weights are, and whoever is first, each folder that always has jobs gets its part, but for one turn.
+    #[test]
+    fn turns_go_by_weights() {
+        for (weights, claims) in [([1, 1], 40), ([100, 1], 505), ([3, 7], 100), ([10, 40], 50)] {
+            let mut line = Line::default();
+            let names = ["a", "b"];
+            let share = |weight| Share { weight: Weight::try_from(weight).unwrap(), most_running: None };
+            line.share(&names.into_iter().map(str::to_owned).zip(weights.map(share)).collect());
+            for id in 0..2 * claims {
+                let mut job = job(id + 1, 10, 5, 0);
+                job.source.folder = names[usize::from(id >= claims)].into();
+                line.update(&job, at(0));
+            }
+            let mut counts = [0.0; 2];
+            for n in 1..=claims {
+                let id = line.first(&any(), at(1)).unwrap();
+                line.begin_turn(id);
+                let entry = line.entries.remove(&id).unwrap();
+                line.leave(id, &entry);
+                counts[entry.folder] += 1.0;
+                let fair = weights.map(|weight| n as f64 * weight as f64 / weights.iter().sum::<i64>() as f64);
+                assert!(
+                    counts.iter().zip(fair).all(|(count, fair)| (count - fair).abs() <= 1.01),
+                    "{weights:?}: {counts:?}, not {fair:?}"
+                );
+            }
+        }
     }
 }

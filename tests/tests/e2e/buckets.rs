@@ -1,9 +1,9 @@
-//! A hot folder in a bucket, on a server that speaks S3 (`moto_server`, which `.ci/run` installs), behind a proxy that fails.
+//! A hot folder in a bucket, on a server that speaks S3, behind a proxy that fails.
 
 use std::io::{Read, Write};
 use std::net::{TcpListener, TcpStream};
 use std::os::unix::process::ExitStatusExt;
-use std::process::{Child, Command, Stdio};
+use std::process::Command;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU8, AtomicUsize, Ordering};
 
@@ -11,61 +11,8 @@ use suture_bench::generate::Case;
 use suture_tests::Place;
 use suture_tests::binary::with_crash_points;
 use suture_tests::hot::{doubtful, holes};
+use suture_tests::moto::{Store, on};
 use suture_tests::served::{Served, wait_until};
-
-/// A server of this test's own.
-struct Store {
-    child: Child,
-    port: u16,
-}
-
-impl Drop for Store {
-    fn drop(&mut self) {
-        let _ = self.child.kill();
-        let _ = self.child.wait();
-    }
-}
-
-impl Store {
-    /// `None`, and a line: this machine has no such server.
-    fn start() -> Option<Self> {
-        let port = TcpListener::bind("127.0.0.1:0").and_then(|free| free.local_addr()).expect("a port").port();
-        let mut command = Command::new("moto_server");
-        command.args(["-H", "127.0.0.1", "-p", &port.to_string()]).stdout(Stdio::null()).stderr(Stdio::null());
-        match command.spawn() {
-            Ok(child) => {
-                let store = Self { child, port };
-                wait_until("the object store listens", || TcpStream::connect(("127.0.0.1", port)).is_ok());
-                Some(store)
-            }
-            Err(error) if std::env::var_os("CI").is_none() => {
-                println!("skipped: moto_server cannot be started: {error}");
-                None
-            }
-            Err(error) => panic!("moto_server: {error}"),
-        }
-    }
-
-    /// Asks, and returns the body of the answer.
-    fn ask(&self, method: &str, path: &str, body: &[u8]) -> Vec<u8> {
-        let mut stream = TcpStream::connect(("127.0.0.1", self.port)).expect("it listens");
-        let head = format!(
-            "{method} {path} HTTP/1.0\r\nHost: localhost\r\nAuthorization: AWS4-HMAC-SHA256 Credential=a/20260101/us-east-1/s3/aws4_request\r\n\
-             Content-Length: {}\r\n\r\n",
-            body.len()
-        );
-        stream.write_all(head.as_bytes()).and_then(|()| stream.write_all(body)).expect("it reads");
-        let mut answer = Vec::new();
-        stream.read_to_end(&mut answer).expect("it answers");
-        let at = answer.windows(4).position(|four| four == b"\r\n\r\n").expect("a head");
-        answer.split_off(at + 4)
-    }
-
-    fn keys(&self) -> Vec<String> {
-        let listed = String::from_utf8(self.ask("GET", "/prints?list-type=2", b"")).expect("text");
-        listed.split("<Key>").skip(1).filter_map(|rest| rest.split('<').next()).map(String::from).collect()
-    }
-}
 
 /// How a proxy before the store behaves.
 const HONEST: u8 = 0;
@@ -131,13 +78,6 @@ fn watch(place: &Place, port: u16) -> Command {
 fn serve(place: &Place, port: u16) -> Command {
     let mut command = on(place.command(), port);
     command.args(["watch", "--config", "suture.toml"]);
-    command
-}
-
-/// Has it use that store.
-fn on(mut command: Command, port: u16) -> Command {
-    command.env("AWS_ENDPOINT", format!("http://127.0.0.1:{port}")).env("AWS_ALLOW_HTTP", "true").env("AWS_REGION", "us-east-1");
-    command.env("AWS_ACCESS_KEY_ID", "a-key").env("AWS_SECRET_ACCESS_KEY", "a-secret");
     command
 }
 

@@ -19,7 +19,7 @@ fn client(server: &Server, name: &str) -> Command {
 }
 
 /// A database of its own on the server.
-fn database(server: &Server) -> String {
+pub(super) fn database(server: &Server) -> String {
     let (name, folder) = (format!("farm_{}", server.number()), server.folder().display().to_string());
     let mut make = client(server, "createdb");
     make.args(["--host", &folder, "--username", "owner", &name]).env_remove("PGPASSWORD");
@@ -38,7 +38,7 @@ fn kinds(place: &Place, folder: &str) -> Vec<String> {
 }
 
 /// Jobs of the database, as someone sees them who asks no daemon: number, folder, kind, attempts.
-fn shared_jobs(place: &Place, url: &str) -> Vec<(u64, String, String, u64)> {
+pub(super) fn shared_jobs(place: &Place, url: &str) -> Vec<(u64, String, String, u64)> {
     let listed = place.suture(["jobs", "list", "--json", "--store", url]).expect(0).stdout();
     let job = |line: &str| {
         let job: serde_json::Value = serde_json::from_str(line).expect("a line of JSON");
@@ -53,7 +53,7 @@ fn shared_jobs(place: &Place, url: &str) -> Vec<(u64, String, String, u64)> {
     listed.lines().map(job).collect()
 }
 
-fn is_over(kind: &str) -> bool {
+pub(super) fn is_over(kind: &str) -> bool {
     matches!(kind, "done" | "needs_review" | "failed")
 }
 

@@ -11,6 +11,7 @@ mod actions;
 mod assets;
 mod frame;
 mod history;
+mod hosts;
 mod job;
 mod login;
 mod night;
@@ -26,6 +27,7 @@ pub(super) fn all() -> Vec<(&'static str, MethodRouter<Arc<Shared>>)> {
         ("/jobs", get(history::history)),
         ("/jobs/{id}", get(job::job)),
         ("/jobs/{id}/{action}", post(actions::act)),
+        ("/hosts/{action}", post(hosts::act)),
         (LOGIN, get(login::form).post(login::login)),
         ("/logout", post(login::logout)),
         ("/assets/{*name}", get(assets::asset)),

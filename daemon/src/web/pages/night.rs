@@ -7,12 +7,13 @@ use axum::http::HeaderMap;
 use axum::response::Response;
 use maud::{Markup, html};
 use suture_core::words::Counted;
-use suture_store::{Job, Kind, Look};
+use suture_store::{Host, Job, Kind, Look};
 
 use super::frame::Frame;
 use super::history::{link, list_of, why};
 use crate::attempt::Context;
 use crate::event_bus::Bus;
+use crate::hosts;
 use crate::html::words::{brief_advice, how_many_need_you, mark, of_which_kind, time};
 use crate::night::NEED_SOMEONE;
 use crate::say::plain;
@@ -36,6 +37,9 @@ struct Night {
     /// Jobs that came back from an attempt, and wait for the next.
     put_off: Vec<Job>,
     ended: Ended,
+    hosts: Vec<Host>,
+    /// Can others share the store?
+    is_shared: bool,
 }
 
 impl Night {
@@ -50,6 +54,8 @@ impl Night {
             in_work: latest(&IN_WORK)?,
             put_off: latest(&[Kind::Waiting])?,
             ended: tally.of(context)?,
+            hosts: hosts::all(context)?,
+            is_shared: context.settings.now().store.is_some(),
         })
     }
 
@@ -67,6 +73,7 @@ impl Night {
 pub(super) async fn night(State(shared): State<Arc<Shared>>, headers: HeaderMap) -> Result<Response, Problem> {
     let all = Arc::clone(&shared);
     let night = ask(&shared.context, move |_| Night::of(&all.context, &all.tally)).await?;
+    let frame = Frame::of(&shared, &headers);
     let body = html! {
         h1 { "Overview" }
         div id="night" data-live {
@@ -77,16 +84,23 @@ pub(super) async fn night(State(shared): State<Arc<Shared>>, headers: HeaderMap)
             (put_off(&night))
             (last_day(&night))
             (folders(&night.status, &shared.context))
+            (super::hosts::table(&night.hosts, night.is_shared, &frame))
+            p class="soft" { "Suture " (night.status.version) }
         }
     };
-    Ok(Frame::of(&shared, &headers).page("/", "Overview", &body))
+    Ok(frame.page("/", "Overview", &body))
 }
 
 /// In a line: does anything need a person?
 fn standing(night: &Night) -> Markup {
     let count = night.count(&NEED_SOMEONE);
-    let Status { held, away, full, untold, reason, .. } = &night.status;
-    let is_held = !held.is_empty() || !away.is_empty() || !full.is_empty() || !untold.is_empty() || reason.is_some();
+    let Status { held, away, full, untold, stranded, reason, .. } = &night.status;
+    let is_held = !held.is_empty()
+        || !away.is_empty()
+        || !full.is_empty()
+        || !untold.is_empty()
+        || !stranded.is_empty()
+        || reason.is_some();
     let (class, words) = match (count, is_held) {
         (0, false) => ("good", how_many_need_you(0)),
         (0, true) => ("review", "No file needs you, but the daemon does not do all of its work.".to_owned()),
@@ -101,6 +115,7 @@ fn standing(night: &Night) -> Markup {
                 @for why in away { li { "Out of reach: " (plain(why)) ". Suture goes on with it by itself when that is mended." } }
                 @for why in full { li { "Disk full: " (plain(why)) ". Suture goes on by itself when there is room again." } }
                 @for who in untold { li { (plain(who)) ". Suture tells it again by itself." } }
+                @for what in stranded { li { "No host for it: " (plain(what)) "." } }
                 @if let (Some(why), true) = (reason, held.is_empty() && away.is_empty()) { li { "Not ready: " (plain(why)) "." } }
             } }
         }
@@ -235,6 +250,5 @@ fn folders(status: &Status, context: &Context) -> Markup {
                 td class="n" { (folder.free_bytes.map_or_else(|| "–".to_owned(), show_size)) }
             } } }
         } }
-        p class="soft" { "Suture " (status.version) }
     }
 }

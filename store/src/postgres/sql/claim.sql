@@ -1,26 +1,50 @@
--- $1 epoch, $2 boot, $3 call, $4 lease in ms, $5 least size, $6 most size, $7 alone, $8 folders that are shut, $9 folders that are served.
+-- $1 epoch, $2 boot, $3 call, $4 lease in ms, $5 least size, $6 most size, $7 alone, $8 folders that are shut, $9 folders that are served,
+-- $10 to $13 what is said of their turns (`suture_turns`).
 -- Connections are told to prefer indexes (`open.rs`): in a new database nothing is known of how many rows there are.
 -- Each step of priority takes 1,800,000 ms of waiting.
 WITH t AS MATERIALIZED (
     SELECT suture_now() AS now
-), ready AS MATERIALIZED (
-    -- Of each priority those that have risen the most, the oldest first.
-    SELECT r.id, r.kind, o.base + k.steps AS rank, 0::bigint AS turn
+), folders AS MATERIALIZED (
+    SELECT name, turn FROM suture_turns($8, $9, $10, $11, $12, $13)
+), heads AS MATERIALIZED (
+    -- Of each folder and priority those that have risen the most.
+    SELECT f.name, f.turn, o.base, o.is_large, k.steps, o.base + k.steps AS rank
     FROM t
-    CROSS JOIN suture_oldest($7, $5, $6, $8, $9) o
+    CROSS JOIN folders f
+    CROSS JOIN LATERAL suture_oldest_of(f.name, $7, $5, $6) o
     CROSS JOIN LATERAL (SELECT least(9 - o.base, greatest(0, t.now - o.waits_since) / 1800000) AS steps) k
+), best AS MATERIALIZED (
+    -- Of those that are wanted the soonest, in the order of their folders' turns; more than one, since others may claim all of the first just now.
+    SELECT h.name, h.turn, h.base, h.is_large, h.steps, h.rank
+    FROM t
+    CROSS JOIN (SELECT max(rank) AS rank FROM heads) m
+    JOIN heads h ON h.rank = m.rank
+    CROSS JOIN LATERAL (
+        SELECT id FROM jobs
+        WHERE kind IN ('queued', 'queued_alone') AND folder = h.name AND alone = $7 AND (size >= 67108864) = h.is_large AND priority = h.base
+            AND size BETWEEN $5 AND $6 AND (h.steps = 0 OR since <= t.now - h.steps * 1800000)
+        ORDER BY id LIMIT 1
+    ) f
+    ORDER BY h.turn, f.id LIMIT 3
+), ready AS MATERIALIZED (
+    -- The oldest first.
+    SELECT r.id, r.kind, b.rank, b.turn
+    FROM t
+    CROSS JOIN best b
     CROSS JOIN LATERAL (
         SELECT id, kind FROM jobs
-        WHERE kind IN ('queued', 'queued_alone') AND alone = $7 AND priority = o.base
-            AND size BETWEEN $5 AND $6 AND folder <> ALL ($8) AND ($9::text[] IS NULL OR folder = ANY ($9))
-            AND (k.steps = 0 OR since <= t.now - k.steps * 1800000)
+        WHERE kind IN ('queued', 'queued_alone') AND folder = b.name AND alone = $7 AND (size >= 67108864) = b.is_large AND priority = b.base
+            AND size BETWEEN $5 AND $6 AND (b.steps = 0 OR since <= t.now - b.steps * 1800000)
         ORDER BY id LIMIT 64
     ) r
 ), rested AS MATERIALIZED (
-    SELECT r.job AS id, 'waiting' AS kind, r.base + least(9 - r.base, greatest(0, t.now - r.waits_since) / 1800000) AS rank, 0::bigint AS turn
-    FROM t CROSS JOIN LATERAL suture_rested(t.now, 'waiting', $8, $9) r
+    SELECT r.job AS id, 'waiting' AS kind, r.base + least(9 - r.base, greatest(0, t.now - r.waits_since) / 1800000) AS rank, f.turn
+    FROM t
+    CROSS JOIN LATERAL suture_rested(t.now, 'waiting', $8, $9) r
+    JOIN jobs j ON j.id = r.job
+    JOIN folders f ON f.name = j.folder
     WHERE r.is_alone = $7 AND r.file_size BETWEEN $5 AND $6
-    ORDER BY rank DESC, id LIMIT 64
+    ORDER BY rank DESC, f.turn, id LIMIT 64
 ), parked AS MATERIALIZED (
     -- Before all others, for whoever asks.
     SELECT r.job AS id, 'parked' AS kind, 10::bigint AS rank, r.ended AS turn
@@ -29,23 +53,23 @@ WITH t AS MATERIALIZED (
 ), candidates AS MATERIALIZED (
     SELECT * FROM ready UNION ALL SELECT * FROM rested UNION ALL SELECT * FROM parked
 ), pick AS MATERIALIZED (
-    SELECT j.id
+    SELECT j.id, CASE WHEN c.kind = 'parked' THEN j.turn ELSE c.turn END AS turn
     FROM candidates c JOIN jobs j ON j.id = c.id
-    WHERE j.kind = c.kind AND EXISTS (SELECT 1 FROM lives WHERE epoch = $1 AND NOT is_over)
+    WHERE j.kind = c.kind AND EXISTS (SELECT 1 FROM lives WHERE epoch = $1 AND NOT is_over) AND NOT suture_drains($1)
     ORDER BY c.rank DESC, c.turn, c.id
     LIMIT 1
     FOR UPDATE OF j SKIP LOCKED
 ), number AS MATERIALIZED (
-    SELECT id, nextval('transitions') AS token FROM pick
+    SELECT id, turn, nextval('transitions') AS token FROM pick
 ), claimed AS (
     UPDATE jobs j
-    SET seq = n.token, token = n.token, epoch = $1, lease_until = t.now + $4, kind = j.kind_claimed, not_before = NULL,
+    SET seq = n.token, token = n.token, epoch = $1, lease_until = t.now + $4, kind = j.kind_claimed, not_before = NULL, turn = n.turn,
         claim_token = n.token, claim_boot = $2, claim_at = t.now, claim_call = $3
     FROM number n, t
     WHERE j.id = n.id
     RETURNING j.id, j.seq, j.record, j.epoch, j.token, j.claim_token, j.claim_boot, j.claim_at
 )
 SELECT id, seq, record, epoch, token, claim_token, claim_boot, claim_at,
-    (SELECT count(*) FROM candidates) AS candidates,
+    (SELECT count(*) FROM candidates) AS candidates, suture_drains($1) AS is_draining,
     EXISTS (SELECT 1 FROM lives WHERE lives.epoch = $1 AND NOT is_over) AS is_alive
 FROM t LEFT JOIN claimed ON true

@@ -1,9 +1,15 @@
 //! Who is next, compared with the model: the statement that claims, and the line in memory, give the same job.
 
+use std::num::NonZeroU32;
+
 use super::*;
 use crate::job::{AGEING_MS, Priority};
 use crate::memory::MemoryStore;
+use crate::share::{Share, Weight};
 use crate::testkit::{ManualClock, dropped};
+
+/// Sizes are around this one, from which on the statements look for files apart.
+const LARGE: u64 = 64 << 20;
 
 /// A small generator, so that a failure can be run again.
 struct Numbers(u64);
@@ -35,16 +41,24 @@ fn the_statement_and_the_model_agree_on_who_is_next() {
         let stores: [&dyn JobStore; 2] = [&model, &store];
         let (mut numbers, mut claimed) = (Numbers(seed), 0);
         for at in 0..150 {
-            let mut found = dropped(&format!("{at}.stl"), numbers.below(1000)).unwrap();
+            let mut found = dropped(&format!("{at}.stl"), LARGE - 500 + numbers.below(1000)).unwrap();
             found.priority = Priority::try_from(i64::try_from(numbers.below(10)).unwrap()).unwrap();
-            found.source.folder = ["hot", "cold"][usize::try_from(numbers.below(2)).unwrap()].into();
+            found.source.folder = ["hot", "cold", "mild"][usize::try_from(numbers.below(3)).unwrap()].into();
             for store in stores {
                 store.submit(std::slice::from_ref(&found)).unwrap();
             }
             clock.pass(numbers.below(AGEING_MS));
             let closed: BTreeSet<String> = if numbers.below(4) == 0 { ["cold".into()].into() } else { BTreeSet::new() };
             stores.iter().for_each(|store| store.shut(&closed));
-            let (least, alone) = (numbers.below(500), numbers.below(8) == 0);
+            if numbers.below(10) == 0 {
+                let mut share = || Share {
+                    weight: Weight::try_from(i64::try_from(1 + numbers.below(100)).unwrap()).unwrap(),
+                    most_running: NonZeroU32::new(u32::try_from(numbers.below(4)).unwrap()),
+                };
+                let shares = [("hot".to_owned(), share()), ("cold".to_owned(), share())].into();
+                stores.iter().for_each(|store| store.share(&shares));
+            }
+            let (least, alone) = (LARGE - 500 + numbers.below(700), numbers.below(8) == 0);
             let want = Filter { size: (least, least + numbers.below(1000)), alone };
             let [expected, waiting] = stores.map(|store| store.waiting(&want).unwrap());
             assert_eq!(waiting, expected, "seed {seed}, step {at}");
@@ -55,7 +69,7 @@ fn the_statement_and_the_model_agree_on_who_is_next() {
             assert_eq!(claim.as_ref().map(|claim| claim.id), expected.as_ref().map(|claim| claim.id), "seed {seed}, step {at}");
             let (Some(expected), Some(claim)) = (expected, claim) else { continue };
             claimed += 1;
-            // Some come back after a pause, some at once, some never.
+            // Some come back after a pause, some at once, some never. None stays in work: leases run out.
             let what = [Step::Environment { reason: "full".into() }, Step::HandBack, Step::NeedsAll, Step::Cancelled]
                 [usize::try_from(numbers.below(4)).unwrap()]
             .clone();

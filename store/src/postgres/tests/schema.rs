@@ -21,7 +21,7 @@ fn eight_that_begin_at_once_make_one_schema() {
     for store in opened {
         store.unwrap().check().unwrap();
     }
-    sql(&shared, "DO $$ BEGIN ASSERT (SELECT count(*) FROM migrations) = 1 AND (SELECT count(*) FROM lives) = 8; END $$")
+    sql(&shared, "DO $$ BEGIN ASSERT (SELECT count(*) FROM migrations) = 2 AND (SELECT count(*) FROM lives) = 8; END $$")
         .unwrap();
 }
 
@@ -30,11 +30,11 @@ fn a_newer_schema_is_refused_and_so_is_one_of_another_make() {
     let Some(server) = server() else { return };
     let shared = server.schema("daemon");
     drop(PostgresStore::open(&shared).unwrap());
-    sql(&shared, "INSERT INTO migrations (version, digest) VALUES (2, ''), (3, '')").unwrap();
+    sql(&shared, "INSERT INTO migrations (version, digest) VALUES (3, ''), (4, '')").unwrap();
     let error = PostgresStore::open(&shared).err().unwrap();
-    assert!(matches!(error, StoreError::Newer { found: 3, known: 1 }), "{error:?}");
-    assert_eq!(error.to_string(), "the job database has version 3; this program knows versions up to 1");
-    sql(&shared, "DELETE FROM migrations WHERE version > 1; UPDATE migrations SET digest = 'x'").unwrap();
+    assert!(matches!(error, StoreError::Newer { found: 4, known: 2 }), "{error:?}");
+    assert_eq!(error.to_string(), "the job database has version 4; this program knows versions up to 2");
+    sql(&shared, "DELETE FROM migrations WHERE version > 2; UPDATE migrations SET digest = 'x'").unwrap();
     let error = PostgresStore::open(&shared).err().unwrap();
     assert!(matches!(error, StoreError::Unusable { .. }) && error.to_string().contains("its version 1"), "{error}");
 }
@@ -97,6 +97,8 @@ fn the_role_can_use_the_store_and_drop_nothing() {
         let heard = store.notices("farm", 100).unwrap().last().unwrap().seq();
         store.acknowledge("farm", heard).unwrap();
         store.claim(&Filter::default()).unwrap();
+        assert!(store.drain("worker", true).unwrap() && store.is_draining().unwrap() && store.drain("worker", false).unwrap());
+        assert_eq!(store.hosts().unwrap().len(), 1);
     }
     for forbidden in [
         "DROP TABLE jobs",
@@ -112,4 +114,30 @@ fn the_role_can_use_the_store_and_drop_nothing() {
         let code = error.as_database_error().and_then(|error| error.code().map(|code| code.into_owned()));
         assert_eq!(code.as_deref(), Some("42501"), "{forbidden}: {error}");
     }
+}
+
+/// What version 1 of the store is made of, its role and a daemon that runs: the update adds to it, and takes nothing away.
+#[test]
+fn a_store_of_version_1_is_brought_up_to_date_beside_a_daemon_of_its_own() {
+    let Some(server) = server() else { return };
+    let shared = server.schema("worker");
+    let first = include_str!("../sql/schema_1.sql");
+    let digest: String = migrate::digest(first).iter().map(|byte| format!("{byte:02x}")).collect();
+    let made = format!(
+        "CREATE SCHEMA {0}; CREATE TABLE migrations (version integer PRIMARY KEY, digest bytea NOT NULL, at timestamptz NOT NULL DEFAULT now());
+        {first}; INSERT INTO migrations (version, digest) VALUES (1, '\\x{digest}'); CREATE ROLE worker_of_1 LOGIN;
+        GRANT USAGE ON SCHEMA {0} TO worker_of_1; GRANT SELECT, INSERT, UPDATE, DELETE ON lives TO worker_of_1;
+        INSERT INTO lives (daemon, folders, began, seen) VALUES ('old:/state', '{{a}}', suture_now(), suture_now())",
+        shared.schema
+    );
+    sql(&shared, &made).unwrap();
+    let store = PostgresStore::open(&shared).unwrap();
+    let old = store.hosts().unwrap().into_iter().find(|host| host.daemon == "old:/state").unwrap();
+    assert_eq!((old.station.host.as_str(), old.station.roles.are_all(), old.is_alive), ("old", true, true));
+    // It serves its folder alone, as it did.
+    let beside = Shared { folders: Some(vec!["a".into()]), joint: ["a".to_owned()].into(), ..other(&shared, "new") };
+    assert!(matches!(PostgresStore::open(&beside), Err(StoreError::Served { .. })));
+    // Its statements go on, and so do its rights.
+    sql(&shared, "UPDATE lives SET seen = suture_now() WHERE daemon = 'old:/state'").unwrap();
+    sql(&shared, "SET ROLE worker_of_1; SELECT count(*) FROM drains").unwrap();
 }

@@ -203,7 +203,7 @@ pub(crate) struct WatchArgs {
     /// PGPASSWORD or ~/.pgpass
     #[arg(long, value_name = "URL", value_parser = Address::parse)]
     pub store: Option<Address>,
-    /// What this daemon does of the work on folders in buckets, with other daemons of the same store for the rest: some of intake, worker, control, with
+    /// This daemon's part of the work on folders in buckets; other daemons of the same store do the rest: some of intake, worker, control, with
     /// commas [default: all]
     #[arg(long = "role", value_name = "ROLES")]
     pub roles: Option<Roles>,

@@ -105,7 +105,7 @@ pub(crate) struct Config {
     pub state: PathBuf,
     /// The database that holds the jobs, and that other daemons share.
     pub store: Option<Address>,
-    /// What this daemon does, and leaves to no other.
+    /// The parts of the work that this daemon does, and leaves to no other.
     pub roles: Roles,
     /// Small files at a time, one thread each.
     pub workers: usize,

@@ -43,7 +43,7 @@ pub(crate) struct Glance {
     pub review: Vec<Job>,
     pub folders: Vec<Served>,
     pub store_bytes: u64,
-    /// What this daemon does.
+    /// The parts of the work that this daemon does.
     #[serde(default)]
     pub roles: Roles,
     /// The daemons that share its store, if others can.
@@ -105,7 +105,7 @@ impl Glance {
     /// When the store failed.
     pub(crate) fn of(context: &Context) -> Result<Self, StoreError> {
         let (store, config) = (&context.store, context.settings.now());
-        let reason = unready(context);
+        let (reason, hosts) = (unready(context), store.hosts()?);
         let held = Kind::ALL.into_iter().filter(|kind| kind.is_held()).collect();
         let of = |kinds, limit| Ok::<_, StoreError>(store.page(&Look { kinds, limit, ..Look::default() })?.jobs);
         Ok(Self {
@@ -113,7 +113,7 @@ impl Glance {
             since: Some(Time(context.bus.life)),
             ready: reason.is_none(),
             reason,
-            standing: standing(context)?,
+            standing: standing_among(context, &hosts)?,
             jobs: counts(context)?,
             work: store.list(&Query { kinds: held, ..Query::default() })?.iter().map(|job| work(context, job)).collect(),
             last: latest(of(Kind::ALL.into_iter().filter(|kind| kind.is_at_rest()).collect(), LATEST)?),
@@ -121,7 +121,7 @@ impl Glance {
             folders: folders(context),
             store_bytes: size_of(&config.state),
             roles: config.roles,
-            hosts: store.hosts()?,
+            hosts,
         })
     }
 
@@ -189,6 +189,11 @@ pub(crate) fn folders(context: &Context) -> Vec<Served> {
 /// # Errors
 /// When the store failed.
 pub(crate) fn standing(context: &Context) -> Result<Standing, StoreError> {
+    standing_among(context, &context.store.hosts()?)
+}
+
+/// The same, where the daemons that share its store are known.
+fn standing_among(context: &Context, hosts: &[Host]) -> Result<Standing, StoreError> {
     let away: Vec<String> = context.away.lock().unwrap_or_else(PoisonError::into_inner).values().flatten().cloned().collect();
     let mut full = Vec::new();
     // Where every disk is full, that is said already.
@@ -206,7 +211,7 @@ pub(crate) fn standing(context: &Context) -> Result<Standing, StoreError> {
     };
     let untold = context.pulse.all_troubles().into_iter().map(words).collect::<Result<_, StoreError>>()?;
     let folders: Vec<String> = context.folders.iter().map(|folder| folder.name.clone()).collect();
-    let stranded = hosts::stranded(&*context.store, &hosts::all(context)?, &folders)?;
+    let stranded = hosts::stranded(&*context.store, &hosts::or_this(hosts.to_vec(), context), &folders)?;
     Ok(Standing { away, full, untold, stranded, ..context.schedule.standing() })
 }
 

@@ -17,12 +17,16 @@ const LATEST: usize = 500;
 /// # Errors
 /// Store errors only.
 pub(crate) fn all(context: &Context) -> Result<Vec<Host>, StoreError> {
-    let hosts = context.store.hosts()?;
+    Ok(or_this(context.store.hosts()?, context))
+}
+
+/// These; or this one, where there are none.
+pub(crate) fn or_this(hosts: Vec<Host>, context: &Context) -> Vec<Host> {
     if !hosts.is_empty() {
-        return Ok(hosts);
+        return hosts;
     }
     let config = context.settings.now();
-    Ok(vec![Host {
+    vec![Host {
         daemon: daemon_name(&config.state),
         station: station(&config),
         folders: context.folders.iter().map(|folder| folder.name.clone()).collect(),
@@ -31,7 +35,7 @@ pub(crate) fn all(context: &Context) -> Result<Vec<Host>, StoreError> {
         is_alive: true,
         is_draining: false,
         running: context.schedule.busy() as u64,
-    }])
+    }]
 }
 
 /// Where a host stands, in a word: also a label of metrics.
@@ -61,7 +65,7 @@ pub(crate) fn line(host: &Host) -> String {
     plain(&format!("{}: {state}, {}, {work} in work{workers}; {version}, process {}", host.daemon, station.roles, station.pid))
 }
 
-/// What waits for a host that is not there, in words, of these hot folders.
+/// Jobs of these hot folders that wait for a host that is not there, in words.
 ///
 /// # Errors
 /// Store errors only.

@@ -95,7 +95,7 @@ pub(crate) struct Standing {
     /// Who could not be told of ends of jobs yet, in words.
     #[serde(default)]
     pub untold: Vec<String>,
-    /// What waits for a host that is not there, in words.
+    /// Jobs that wait for a host that is not there, in words.
     #[serde(default)]
     pub stranded: Vec<String>,
 }
@@ -150,7 +150,7 @@ impl Schedule {
     pub(crate) fn new(world: Arc<dyn World>) -> Self {
         let last_alone = world.steady();
         let state =
-            State { busy: 0, computing: 0, alone: false, held: [None, None, None], most: usize::MAX, stop: false, last_alone };
+            State { busy: 0, computing: 0, alone: false, held: Default::default(), most: usize::MAX, stop: false, last_alone };
         Self { state: Mutex::new(state), wake: Condvar::new(), world }
     }
 

@@ -75,7 +75,7 @@ pub(crate) struct Made {
     pub(crate) stays: bool,
 }
 
-/// What becomes of a mesh that is good as it came.
+/// The ways of a mesh that is good as it came.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Good {
     /// Its file is not of the output's format: its triangles are written.
@@ -273,7 +273,9 @@ fn write(
     report.edit = edit.summary(mesh.records().len());
     report.edit_records = limits.list_edit.then(|| edit.listed());
     if matches!(content, Content::Nothing) {
-        keep(report, mesh, limits, progress)?;
+        // The input is its own result: all that was found in it holds.
+        let facts = report.input.clone();
+        conclude(report, mesh, facts, limits, progress)?;
         return Ok((written, true));
     }
     if same {
@@ -321,11 +323,6 @@ fn confirm_copy(report: &mut Report, input: &MeshFile, output: &Path, limits: &L
         return Err(Error::Changed { path: input.path().into() });
     }
     conclude(report, &written, facts, limits, progress)
-}
-
-/// The input is its own result: what was found in it holds.
-fn keep(report: &mut Report, input: &MeshFile, limits: &Limits, progress: &dyn Progress) -> Result<()> {
-    conclude(report, input, report.input.clone(), limits, progress)
 }
 
 /// Concludes a report on a mesh to which nothing was done.

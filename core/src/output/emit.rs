@@ -85,7 +85,7 @@ pub(crate) fn write(
     sink.finish(limits)
 }
 
-/// What of a mesh is copied while it is not known yet what the output is to hold.
+/// How much of a mesh is copied while it is not known yet what the output is to hold.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Ahead {
     /// As much as may be in the output.
@@ -105,7 +105,7 @@ pub(crate) fn draft<R>(
     let bytes = match ahead {
         Ahead::Nothing => 0,
         Ahead::All if mesh.is_flawless() => u64::MAX,
-        // What stands behind the records is copied only with a file that may turn out to be good as it is.
+        // Bytes behind the records are copied only with a file that may turn out to be good as it is.
         Ahead::All => end_of(mesh.records().len()),
     };
     let wanted = Wanted { bytes: AtomicU64::new(bytes), awaited: AtomicBool::new(false), given_up: AtomicBool::new(false) };

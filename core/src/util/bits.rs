@@ -44,32 +44,28 @@ pub(crate) fn take(bits: &mut [u64], number: usize) {
 
 /// The first bit that is set from `at` on, or past the end.
 pub(crate) fn next_one(bits: &[u64], at: usize) -> usize {
-    let mut word = at / 64;
-    let mut mask = !0u64 << (at % 64);
-    while word < bits.len() {
-        let found = bits[word] & mask;
-        if found != 0 {
-            return word * 64 + found.trailing_zeros() as usize;
-        }
-        word += 1;
-        mask = !0;
-    }
-    usize::MAX
+    next(bits, at, |word| word).unwrap_or(usize::MAX)
 }
 
 /// The first bit that is not set from `at` on, or past the end of all words.
 pub(crate) fn next_zero(bits: &[u64], at: usize) -> usize {
+    next(bits, at, |word| !word).unwrap_or(at.max(bits.len() * 64))
+}
+
+/// The first bit from `at` on that is set in the `view` of its word.
+#[inline]
+fn next(bits: &[u64], at: usize, view: impl Fn(u64) -> u64) -> Option<usize> {
     let mut word = at / 64;
     let mut mask = !0u64 << (at % 64);
     while word < bits.len() {
-        let found = !bits[word] & mask;
+        let found = view(bits[word]) & mask;
         if found != 0 {
-            return word * 64 + found.trailing_zeros() as usize;
+            return Some(word * 64 + found.trailing_zeros() as usize);
         }
         word += 1;
         mask = !0;
     }
-    at.max(bits.len() * 64)
+    None
 }
 
 /// All bits that are set.

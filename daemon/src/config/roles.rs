@@ -1,4 +1,4 @@
-//! What a daemon needs that leaves a part of the work to others.
+//! A daemon that leaves a part of the work to others needs a store and folders that others see.
 
 use suture_store::Role;
 

@@ -7,6 +7,7 @@ use crate::contract::error::Result;
 use crate::contract::finite;
 use crate::contract::report::{Cost, Report, Stage};
 use crate::util::cost;
+use crate::util::peak::Peak;
 
 /// Runs from the beginning of the work on a mesh to its report.
 pub(crate) struct Clock {
@@ -14,20 +15,19 @@ pub(crate) struct Clock {
     lap: Instant,
     cpu_seconds_before: f64,
     stages: Vec<Stage>,
-    peak_anonymous_bytes: u64,
+    peak: Peak,
 }
 
 impl Clock {
     pub(crate) fn start() -> Self {
         let now = Instant::now();
-        Self { start: now, lap: now, cpu_seconds_before: cost::cpu_seconds(), stages: Vec::new(), peak_anonymous_bytes: 0 }
+        Self { start: now, lap: now, cpu_seconds_before: cost::cpu_seconds(), stages: Vec::new(), peak: Peak::begin() }
     }
 
     /// Ends the stage that ran until now.
     pub(crate) fn stage(&mut self, name: &str) {
         let seconds = self.lap.elapsed().as_secs_f64();
         self.lap = Instant::now();
-        self.peak_anonymous_bytes = self.peak_anonymous_bytes.max(cost::anonymous_bytes());
         tracing::debug!(stage = name, seconds, "Stage done.");
         match self.stages.iter_mut().find(|stage| stage.name == name) {
             Some(stage) => stage.seconds += seconds,
@@ -49,7 +49,7 @@ impl Clock {
             cpu_seconds: cost::cpu_seconds() - self.cpu_seconds_before,
             triangles_per_second: triangles as f64 / wall_seconds.max(1e-9),
             peak_resident_bytes: cost::peak_resident_bytes(),
-            peak_anonymous_bytes: self.peak_anonymous_bytes,
+            peak_anonymous_bytes: self.peak.bytes(),
         }
     }
 }

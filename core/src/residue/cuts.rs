@@ -1,25 +1,16 @@
-//! Cutting moves as straight pieces, sorted by the tool that makes them.
+//! Cutting moves, sorted by the tool that makes them.
 
+use super::chains::Chains;
 use super::options::Error;
 use super::profile::Profile;
 use super::tree::{Reach, Tree};
 use crate::curves::vector::{Point, add, distance, dot, plain_norm, plain_unit, scale, sub};
-use crate::toolpath::{Kind, Move, Moves, Tool};
+use crate::toolpath::{Move, Moves, Tool};
 
-/// How far a chord may be from its arc, as a part of the tool's radius.
-const CHORD: f64 = 1e-4;
-/// Length of a piece, at most, in radii of the tool: boxes of long oblique pieces are mostly empty.
-const LONGEST: f64 = 8.0;
 /// An axis this close to Z is upright.
 const UPRIGHT: f64 = 1.0 - 1e-12;
-
-/// A part of a move: 8 bytes.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Piece {
-    number: u32,
-    part: u16,
-    parts: u16,
-}
+/// The axis of all tools that are upright.
+const UP: Point = [0.0, 0.0, 1.0];
 
 /// A piece's ends, which are places of the tool's tip.
 #[derive(Clone, Copy, Debug)]
@@ -36,31 +27,25 @@ impl Segment {
 }
 
 /// The cuts of one tool, either with an upright axis or with leaning ones.
-pub(crate) struct Family<'a> {
-    moves: &'a Moves,
+pub(crate) struct Family {
     pub(crate) profile: Profile,
     pub(crate) is_upright: bool,
-    pieces: Vec<Piece>,
+    chains: Chains,
     pub(crate) tree: Tree,
 }
 
-impl Family<'_> {
-    /// The places that a piece reaches; `None` beyond the last one.
+impl Family {
+    /// The places that a piece reaches; `None` where no piece has that number.
     fn reach(&self, piece: u32) -> Option<Reach> {
         let Segment { from, to, axis } = self.segment(piece)?;
         Some(Reach { ends: [from, to], shank: (!self.is_upright).then(|| scale(axis, self.profile.length)) })
     }
 
-    /// A piece's ends; `None` beyond the last one. O(1).
+    /// A piece's ends; `None` where no piece has that number. O(1).
     pub(crate) fn segment(&self, piece: u32) -> Option<Segment> {
-        let piece = self.pieces.get(piece as usize)?;
-        let one = self.moves.get(piece.number as usize)?;
-        let at = |part: u16| match part {
-            0 => one.from,
-            part if part == piece.parts => one.to,
-            part => one.point(f64::from(part) / f64::from(piece.parts)),
-        };
-        Some(Segment { from: at(piece.part), to: at(piece.part + 1), axis: one.axis })
+        let [from, to] = self.chains.ends(piece)?;
+        let axis = if self.is_upright { UP } else { self.chains.axis(piece)? };
+        Some(Segment { from, to, axis })
     }
 
     /// Direction of the path about a place of a piece, and how far the path goes on behind and ahead without a corner, up to `window`.
@@ -76,10 +61,8 @@ impl Family<'_> {
     /// The piece that goes on where one ends (`step` 1) or begins (−1), without a corner.
     pub(crate) fn next(&self, piece: u32, own: &Segment, step: i64) -> Option<u32> {
         let next = u32::try_from(i64::from(piece) + step).ok()?;
-        let segment = self.segment(next)?;
-        let (end, begin) = if step > 0 { (own.to, segment.from) } else { (own.from, segment.to) };
-        let (way, before) = (segment.way(), own.way());
-        (begin == end && dot(way, before) >= 0.7 * plain_norm(way) * plain_norm(before)).then_some(next)
+        let (way, before) = (self.segment(next)?.way(), own.way());
+        (dot(way, before) >= 0.7 * plain_norm(way) * plain_norm(before)).then_some(next)
     }
 
     /// Walks along the path, and says how far it came and where it is.
@@ -109,61 +92,69 @@ impl Family<'_> {
     }
 }
 
-/// How many pieces a move has: arcs are cut into chords, long lines into shorter ones.
-fn parts(one: &Move, profile: &Profile) -> u16 {
-    let long = one.length() / (LONGEST * profile.radius);
-    let fine = match one.kind {
-        Kind::Arc { centre, normal, sweep } => {
-            let from_centre = sub(one.from, centre);
-            let radius = plain_norm(sub(from_centre, scale(normal, dot(from_centre, normal))));
-            let chord = (CHORD * profile.radius).max(1e-12);
-            // A chord over an angle a is radius·(1 − cos(a/2)) ≈ radius·a²/8 away from its arc.
-            sweep.abs() / (8.0 * chord / radius.max(chord)).sqrt()
-        }
-        _ => 1.0,
-    };
-    long.max(fine).ceil().clamp(1.0, f64::from(u16::MAX)) as u16
+/// All that tools cut, ready to be asked for the cut nearest to a place.
+///
+/// Memory: about 30 bytes a piece, of which there are at most as many as moves and chords of arcs, and far fewer where moves are short; the moves
+/// are not needed any more.
+pub struct Cuts {
+    pub(crate) families: Vec<Family>,
 }
 
-/// Sorts the cutting moves by tool and builds a hierarchy over each tool's. O(n log n) for n pieces; 9 to 14 bytes a piece.
-///
-/// # Errors
-/// [`Error::Tool`] if a move's tool is not known; [`Error::Stopped`].
-pub(crate) fn families<'a>(
-    moves: &'a Moves,
-    tools: &[Tool],
-    go_on: &(dyn Fn() -> bool + Sync),
-) -> Result<Vec<Family<'a>>, Error> {
-    let mut keys: Vec<((u32, bool), Profile, Vec<Piece>)> = Vec::new();
-    for (one, number) in moves.iter().zip(0u32..) {
-        if number % (1 << 16) == 0 && !go_on() {
-            return Err(Error::Stopped);
-        }
-        if !one.is_cut() || one.length() == 0.0 {
-            continue;
-        }
-        let key = (one.tool, one.axis[2] >= UPRIGHT);
-        let place = match keys.iter().position(|(other, ..)| *other == key) {
-            Some(place) => place,
-            None => {
-                let tool = tools.iter().find(|tool| tool.number == one.tool).ok_or(Error::Tool(one.tool))?;
-                keys.push((key, Profile::new(tool, key.1).ok_or(Error::Tool(one.tool))?, Vec::new()));
-                keys.len() - 1
+impl Cuts {
+    /// Sorts the cutting moves by tool and builds a hierarchy over each tool's. O(n log n) for n moves.
+    ///
+    /// # Errors
+    /// [`Error::Tool`] if a move's tool is not known; [`Error::NoCuts`]; [`Error::Stopped`] if `go_on` says so, which is asked at least every
+    /// second.
+    pub fn new(moves: &Moves, tools: &[Tool], go_on: &(dyn Fn() -> bool + Sync)) -> Result<Self, Error> {
+        let mut sorted = Sorted { tools, keys: Vec::new(), families: Vec::new() };
+        for (number, one) in moves.iter().enumerate() {
+            if number % (1 << 16) == 0 && !go_on() {
+                return Err(Error::Stopped);
             }
-        };
-        let Some((_, profile, pieces)) = keys.get_mut(place) else { continue };
-        let parts = parts(&one, profile);
-        pieces.extend((0..parts).map(|part| Piece { number, part, parts }));
-    }
-    let mut families = Vec::new();
-    for ((_, is_upright), profile, mut pieces) in keys {
-        pieces.shrink_to_fit();
-        let mut family = Family { moves, profile, is_upright, pieces, tree: Tree::default() };
-        family.tree = Tree::new(family.pieces.len(), &|piece| family.reach(piece));
-        if !go_on() {
-            return Err(Error::Stopped);
+            if one.is_cut() && one.length() != 0.0 {
+                sorted.push(&one)?;
+            }
         }
-        families.push(family);
+        let mut families = sorted.families;
+        for family in &mut families {
+            family.chains.end();
+            family.tree = Tree::new(family.chains.len(), &|piece| family.reach(piece));
+            if !go_on() {
+                return Err(Error::Stopped);
+            }
+        }
+        if families.is_empty() { Err(Error::NoCuts) } else { Ok(Self { families }) }
     }
-    Ok(families)
+
+    /// The memory that they take.
+    #[must_use]
+    pub fn bytes(&self) -> u64 {
+        self.families.iter().map(|family| family.chains.bytes() + family.tree.bytes()).sum()
+    }
+}
+
+/// Families that grow.
+struct Sorted<'a> {
+    tools: &'a [Tool],
+    /// For each family its tool, and whether that is upright.
+    keys: Vec<(u32, bool)>,
+    families: Vec<Family>,
+}
+
+impl Sorted<'_> {
+    fn push(&mut self, one: &Move) -> Result<(), Error> {
+        let key = (one.tool, one.axis[2] >= UPRIGHT);
+        if !self.keys.contains(&key) {
+            let tool = self.tools.iter().find(|tool| tool.number == one.tool).ok_or(Error::Tool(one.tool))?;
+            let profile = Profile::new(tool, key.1).ok_or(Error::Tool(one.tool))?;
+            self.keys.push(key);
+            self.families.push(Family { profile, is_upright: key.1, chains: Chains::default(), tree: Tree::default() });
+        }
+        let family = self.keys.iter().zip(&mut self.families).find(|(other, _)| **other == key);
+        if let Some((_, Family { profile, is_upright, chains, .. })) = family {
+            chains.push(one, profile, *is_upright);
+        }
+        Ok(())
+    }
 }

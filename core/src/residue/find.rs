@@ -1,6 +1,6 @@
 //! The search for residue: vertices judged, triangles marked, regions described.
 
-use super::cuts::{Family, families};
+use super::cuts::{Cuts, Family};
 use super::found::{Fit, Found, Kind, Mesh, RegionReport};
 use super::frame::{self, Frame, SAMPLES};
 use super::intended::{Limits, Scratch, Verdict, judge};
@@ -8,7 +8,6 @@ use super::options::{Corrections, Error, Options};
 use super::regions::{clean, neighbours, pieces};
 use super::sweep::nearest;
 use crate::curves::vector::{Point, cross, plain_norm, sub};
-use crate::toolpath::{Moves, Tool};
 use rayon::prelude::*;
 
 /// Vertices that are judged one after the other by one thread; each begins with the cut that the one before it found.
@@ -56,16 +55,13 @@ impl Mark {
 /// Finds what the cutter left.
 ///
 /// A triangle is residue's if at least two of its vertices lie between passes that touch the part beside them (three halves and more,
-/// where a vertex on the last pass counts half). O((vertices + moves) · log moves).
+/// where a vertex on the last pass counts half). O(vertices · log moves).
 ///
 /// # Errors
 /// [`Error`].
-pub fn find(mesh: Mesh<'_>, moves: &Moves, tools: &[Tool], options: &Options<'_>) -> Result<Found, Error> {
+pub fn find(mesh: Mesh<'_>, cuts: &Cuts, options: &Options<'_>) -> Result<Found, Error> {
     check(mesh, options)?;
-    let families = families(moves, tools, options.go_on)?;
-    if families.is_empty() {
-        return Err(Error::NoCuts);
-    }
+    let families = &cuts.families;
     let limits: Vec<Limits> = families.iter().map(|family| limits(mesh, family, options)).collect();
     let mut marks = vec![Mark::OUT; mesh.points.len()];
     let fit = mesh
@@ -73,11 +69,10 @@ pub fn find(mesh: Mesh<'_>, moves: &Moves, tools: &[Tool], options: &Options<'_>
         .par_chunks(BLOCK)
         .zip(marks.par_chunks_mut(BLOCK))
         .map_init(Scratch::default, |lent, (points, marks)| {
-            (options.go_on)().then(|| block(points, &families, &limits, (marks, lent)))
+            (options.go_on)().then(|| block(points, families, &limits, (marks, lent)))
         })
         .try_reduce(Fit::default, |a, b| Some(a.and(b)));
     let fit = fit.ok_or(Error::Stopped)?;
-    drop(families);
     let height_min = options
         .height_min
         .unwrap_or_else(|| limits.iter().map(|limits| HEIGHT_LEAST * limits.tolerance).fold(f64::INFINITY, f64::min));
@@ -89,9 +84,9 @@ pub fn find(mesh: Mesh<'_>, moves: &Moves, tools: &[Tool], options: &Options<'_>
 ///
 /// # Errors
 /// [`Error`].
-pub fn frame(mesh: Mesh<'_>, moves: &Moves, tools: &[Tool], options: &Options<'_>) -> Result<Option<Frame>, Error> {
+pub fn frame(mesh: Mesh<'_>, cuts: &Cuts, options: &Options<'_>) -> Result<Option<Frame>, Error> {
     check(mesh, options)?;
-    let families = families(moves, tools, options.go_on)?;
+    let families = &cuts.families;
     let limits: Vec<Limits> = families.iter().map(|family| limits(mesh, family, options)).collect();
     let step = mesh.points.len().div_ceil(SAMPLES).max(1);
     let sample: Vec<[f32; 3]> = mesh.points.iter().step_by(step).copied().collect();
@@ -99,7 +94,7 @@ pub fn frame(mesh: Mesh<'_>, moves: &Moves, tools: &[Tool], options: &Options<'_
     let fit = |frame: &Frame| {
         let points: Vec<[f32; 3]> = sample.iter().map(|point| frame.into_path(*point)).collect();
         let mut marks = vec![Mark::OUT; points.len()];
-        (*frame, block(&points, &families, &limits, (&mut marks, &mut Scratch::default())))
+        (*frame, block(&points, families, &limits, (&mut marks, &mut Scratch::default())))
     };
     let fits: Vec<(Frame, Fit)> = frames.par_iter().map(fit).collect();
     Ok(frame::clear(&fits, sample.len()))
@@ -119,7 +114,7 @@ pub(super) fn check(mesh: Mesh<'_>, options: &Options<'_>) -> Result<(), Error> 
     Ok(())
 }
 
-fn limits(mesh: Mesh<'_>, family: &Family<'_>, options: &Options<'_>) -> Limits {
+fn limits(mesh: Mesh<'_>, family: &Family, options: &Options<'_>) -> Limits {
     let radius = family.profile.radius;
     let greatest = mesh.points.iter().flatten().fold(0.0f32, |most, x| most.max(x.abs()));
     let rounding = 4.0 * f64::from(greatest) * f64::from(f32::EPSILON);
@@ -128,7 +123,7 @@ fn limits(mesh: Mesh<'_>, family: &Family<'_>, options: &Options<'_>) -> Limits 
 }
 
 /// Judges a block of vertices; each begins with the cut that the one before it found.
-fn block(points: &[[f32; 3]], families: &[Family<'_>], limits: &[Limits], (marks, lent): (&mut [Mark], &mut Scratch)) -> Fit {
+fn block(points: &[[f32; 3]], families: &[Family], limits: &[Limits], (marks, lent): (&mut [Mark], &mut Scratch)) -> Fit {
     let (mut starts, mut fit) = (vec![None; families.len()], Fit::default());
     for (point, mark) in points.iter().zip(marks) {
         *mark = vertex(point.map(f64::from), families, limits, (&mut starts, lent, &mut fit));
@@ -139,7 +134,7 @@ fn block(points: &[[f32; 3]], families: &[Family<'_>], limits: &[Limits], (marks
 /// Judges a vertex by the cut nearest to it, or by the nearest one in another direction: short moves that join passes cut there too.
 fn vertex(
     point: Point,
-    families: &[Family<'_>],
+    families: &[Family],
     limits: &[Limits],
     (starts, lent, fit): (&mut [Option<u32>], &mut Scratch, &mut Fit),
 ) -> Mark {

@@ -7,7 +7,7 @@
 //! tool whose passes are v apart along the axis and w across, the steps are v·w/√(v² + w²) high.
 
 use super::cuts::Family;
-use super::sweep::{Crossing, Touch, section, silhouette};
+use super::sweep::{Crossing, Touch, section, silhouette, silhouette_depth};
 use crate::curves::vector::{Point, add, cross, dot, plain_norm, plain_unit, scale, sub};
 
 /// Radii of the tool between neighbouring passes, at most.
@@ -60,7 +60,7 @@ pub(crate) struct Scratch {
 
 /// The view along a pass: tool, axis, course.
 struct View<'a> {
-    family: &'a Family<'a>,
+    family: &'a Family,
     axis: Point,
     course: Point,
     crossings: &'a [Crossing],
@@ -71,6 +71,10 @@ impl View<'_> {
         silhouette(&self.family.profile, self.axis, self.course, from_centre)
     }
 
+    fn depth(&self, from_centre: Point) -> f64 {
+        silhouette_depth(&self.family.profile, self.axis, self.course, from_centre)
+    }
+
     /// Whether what a pass leaves is cut away by others: its contact with the intended surface, about whose normal `down` is, lies in
     /// their volume.
     fn is_hidden(&self, place: Point, down: Point) -> bool {
@@ -79,7 +83,7 @@ impl View<'_> {
         [0.0f64, 0.17, -0.17, 0.34, -0.34].iter().all(|angle| {
             let normal = add(scale(down, angle.cos()), scale(side, angle.sin()));
             let contact = add(place, self.family.profile.support(normal, self.axis));
-            let is_cut = |other: &Crossing| other.place != place && self.distance(sub(contact, other.place)).0 < -slack;
+            let is_cut = |other: &Crossing| other.place != place && self.depth(sub(contact, other.place)) < -slack;
             self.crossings.iter().any(is_cut)
         })
     }
@@ -106,13 +110,13 @@ impl View<'_> {
 }
 
 /// Distance of neighbouring passes, at most: flat parts of the tool may leave as much between its round ones.
-fn step_most(family: &Family<'_>) -> f64 {
+fn step_most(family: &Family) -> f64 {
     let profile = &family.profile;
     (STEP_MOST * profile.radius).max(2.0 * profile.flat() + STEP_MOST * profile.round)
 }
 
 /// Judges a point that a pass touches; `None` where no surface is intended beside the cut one.
-pub(crate) fn judge(family: &Family<'_>, point: Point, touch: Touch, limits: Limits, lent: &mut Scratch) -> Option<Verdict> {
+pub(crate) fn judge(family: &Family, point: Point, touch: Touch, limits: Limits, lent: &mut Scratch) -> Option<Verdict> {
     let radius = family.profile.radius;
     let (course, [behind, ahead]) = family.direction(touch.piece, touch.at, WINDOW * radius)?;
     let segment = family.segment(touch.piece)?;
@@ -161,12 +165,12 @@ pub(crate) fn judge(family: &Family<'_>, point: Point, touch: Touch, limits: Lim
 }
 
 /// Of passes that touch a point equally, takes the one whose edge is nearest, and makes it the origin.
-fn recentre(family: &Family<'_>, from_centre: Point, (axis, course): (Point, Point), crossings: &mut [Crossing]) -> Point {
+fn recentre(family: &Family, from_centre: Point, (axis, course): (Point, Point), crossings: &mut [Crossing]) -> Point {
     let slack = 1e-6 * family.profile.radius;
     let mut best: Option<(f64, f64, Point)> = None;
     for crossing in crossings.iter() {
         let away = sub(from_centre, crossing.place);
-        let distance = silhouette(&family.profile, axis, course, away).0;
+        let distance = silhouette_depth(&family.profile, axis, course, away);
         let far = plain_norm(sub(away, scale(axis, dot(away, axis))));
         let is_better = best.is_none_or(|(least, edge, _)| {
             distance < least - slack || (distance < least + slack && far > edge + slack && far < family.profile.radius + slack)
@@ -236,7 +240,7 @@ impl Neighbours {
             return None;
         }
         // A flat part of the tool covers the way to the next pass: nothing is left here, but perhaps beside it.
-        let beside = view.distance(sub(from_centre, curve.point(CONTACT))).0;
+        let beside = view.depth(sub(from_centre, curve.point(CONTACT)));
         if view.family.profile.flat() > 0.0
             && (beside - self.distance).abs() < 1e-6 * radius
             && self.distance.abs() <= limits.tolerance
@@ -321,31 +325,44 @@ impl Curve {
     /// The place whose tool touches the intended surface where a point is nearest to that: its parameter, the point's height above the
     /// surface, which is negative beneath it, and the surface's normal, into the part. `down` is about that normal.
     fn foot(&self, view: &View<'_>, from_centre: Point, down: Point) -> Option<(f64, f64, Point)> {
-        let (mut low, mut high) = (-0.1, 1.1);
-        let mut at = 0.0;
-        let slack = 1e-9 * dot(self.step, self.step);
-        let mut found = None;
-        for _ in 0..STEPS {
+        // How far the point lies ahead of what the tool touches from a place; the place of the foot is where that changes its sign.
+        let look = |at: f64| {
             let slope = self.slope(at);
             let normal = plain_unit(cross(view.course, slope))?;
             let normal = if dot(normal, down) < 0.0 { scale(normal, -1.0) } else { normal };
             let contact = add(self.point(at), view.family.profile.support(normal, view.axis));
             let away = sub(from_centre, contact);
-            found = Some((at, -dot(away, normal), normal));
-            let ahead = dot(away, slope);
+            Some((dot(away, slope), (at, -dot(away, normal), normal)))
+        };
+        let slack = 1e-9 * dot(self.step, self.step);
+        let (mut first, here) = look(0.0)?;
+        if first.abs() <= slack {
+            return Some(here);
+        }
+        let far = if first > 0.0 { 1.1 } else { -0.1 };
+        let (mut second, there) = look(far)?;
+        if (second > 0.0) == (first > 0.0) {
+            return Some(there);
+        }
+        // The Illinois method: M. Dowell, P. Jarratt, *A modified regula falsi method for computing the root of an equation*, BIT 11, 1971.
+        let (mut low, mut high, mut found) = (0.0, far, there);
+        for _ in 0..STEPS {
+            let at = low + (high - low) * first / (first - second);
+            let (ahead, foot) = look(at)?;
+            found = foot;
             if ahead.abs() <= slack {
                 break;
             }
-            if ahead > 0.0 {
-                low = at
+            if (ahead > 0.0) == (second > 0.0) {
+                first *= 0.5;
             } else {
-                high = at
+                (low, first) = (high, second);
             }
-            at = 0.5 * (low + high);
+            (high, second) = (at, ahead);
         }
-        found
+        Some(found)
     }
 }
 
-/// Halvings of the interval between two passes.
+/// Steps of the search for a foot, at most; a handful is usual.
 const STEPS: usize = 34;

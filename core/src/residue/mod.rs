@@ -5,11 +5,12 @@
 //! mesh with those regions moved there; [`hint`], [`suspects()`]: waves of a patch, or of a whole mesh, without a path, for a person to
 //! look at.
 //!
-//! The swept volume is the least signed distance from the tool over all cutting moves (`cuts`, `tree`, `sweep`, `profile`); `intended` has
+//! The swept volume is the least signed distance from the tool over all cutting moves (`chains`, `cuts`, `tree`, `sweep`, `profile`); `intended` has
 //! the surface between passes, `find` and `regions` the triangles, `repair` the move.
 //! **Promise:** borders of regions and all outside them stay as they are, to the bit; the same result for any number of threads.
 
 mod brush;
+mod chains;
 mod cuts;
 mod find;
 mod found;
@@ -28,6 +29,7 @@ mod waves;
 mod tests;
 
 pub use brush::{Brush, BrushError};
+pub use cuts::Cuts;
 pub use find::{find, frame};
 pub use found::{Fit, Found, Kind, Mesh, RegionReport};
 pub use frame::{FIT_LEAST, Frame};

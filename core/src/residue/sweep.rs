@@ -33,7 +33,7 @@ pub(crate) struct Crossing {
 /// The cut nearest to a point, nearer than `most`. `start` is a piece to begin with, which saves time; `other` is a direction
 /// from which that of the cut has to differ by more than 45°. O(log n) for n pieces if few come as near.
 pub(crate) fn nearest(
-    family: &Family<'_>,
+    family: &Family,
     point: Point,
     most: f64,
     start: Option<u32>,
@@ -71,7 +71,7 @@ pub(crate) fn nearest(
 
 /// Among places of a pass that are as near, takes the one beside the point: flat tools touch along a part of their way. O(pieces that
 /// the tool covers).
-fn settle(family: &Family<'_>, touch: Touch, point: Point) -> Touch {
+fn settle(family: &Family, touch: Touch, point: Point) -> Touch {
     let mut touch = touch;
     let mut course = None;
     for _ in 0..COVERED {
@@ -110,6 +110,16 @@ fn least(profile: &Profile, segment: &Segment, point: Point, most: f64) -> Optio
         let (distance, gradient) = profile.distance(sub(point, add(segment.from, scale(way, at))), segment.axis);
         (distance, -dot(gradient, way))
     };
+    if profile.is_ball() {
+        // Of a sphere, the least distance is where its centre is nearest; that of the shank above it may be elsewhere.
+        let from_centre = sub(sub(point, segment.from), scale(segment.axis, profile.centre()));
+        let at = (dot(from_centre, way) / dot(way, way)).clamp(0.0, 1.0);
+        let away = sub(from_centre, scale(way, at));
+        if dot(away, segment.axis) <= 0.0 {
+            let distance = plain_norm(away) - profile.radius;
+            return (distance < most).then_some((at, distance));
+        }
+    }
     let (mut low, mut high) = (0.0, 1.0);
     let (first, mut falls) = slope(low);
     if falls >= 0.0 {
@@ -150,7 +160,7 @@ fn least(profile: &Profile, segment: &Segment, point: Point, most: f64) -> Optio
 
 /// Passes that cross the plane through a place of the tool's centre, at right angles to a direction, up to `reach` from the place.
 pub(crate) fn section(
-    family: &Family<'_>,
+    family: &Family,
     origin: Point,
     normal: Point,
     reach: f64,
@@ -182,12 +192,24 @@ pub(crate) fn section(
     family.tree.search(&mut 0.5, stack, bound, visit);
 }
 
+/// The distance that [`silhouette`] finds.
+pub(crate) fn silhouette_depth(profile: &Profile, axis: Point, course: Point, from_centre: Point) -> f64 {
+    if is_widest(profile, axis, course, from_centre) {
+        return profile.depth(add(from_centre, scale(axis, profile.centre())), axis);
+    }
+    silhouette(profile, axis, course, from_centre).0
+}
+
+/// Whether the tool is nowhere along a line through its centre nearer to a point beside that centre than there.
+fn is_widest(profile: &Profile, axis: Point, course: Point, from_centre: Point) -> bool {
+    dot(axis, course).abs() < 1e-4 || (profile.is_ball() && dot(from_centre, axis) <= 0.0)
+}
+
 /// Signed distance of a point from what a tool sweeps along an endless line through its centre, and its gradient. The point is
 /// given from the centre, at right angles to the line.
 pub(crate) fn silhouette(profile: &Profile, axis: Point, course: Point, from_centre: Point) -> (f64, Point) {
     let from_tip = add(from_centre, scale(axis, profile.centre()));
-    let lean = dot(axis, course);
-    if lean.abs() < 1e-4 || (profile.is_ball() && dot(from_centre, axis) <= 0.0) {
+    if is_widest(profile, axis, course, from_centre) {
         return profile.distance(from_tip, axis);
     }
     let slope = |at: f64| {

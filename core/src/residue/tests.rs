@@ -1,9 +1,8 @@
 //! A floor and a slope that a few passes cut: heights are known from the tool's outline alone.
 
-use super::cuts::families;
 use super::profile::Profile;
 use super::sweep::nearest;
-use super::{Corrections, Error, Found, Kind, Mesh, Options, find, repair};
+use super::{Corrections, Cuts, Error, Found, Kind, Mesh, Options, find, repair};
 use crate::curves::vector::{Point, add, scale, sub};
 use crate::toolpath::{Kind as Way, Move, Moves, Shape, Tool};
 
@@ -46,7 +45,8 @@ fn scallops() -> (Vec<[f32; 3]>, Vec<[u32; 3]>) {
 
 fn search(moves: &Moves, shape: Shape, options: &Options<'_>) -> Result<Found, Error> {
     let (points, faces) = scallops();
-    find(Mesh { points: &points, faces: &faces }, moves, &[Tool::new(1, shape, 6.0)], options)
+    let cuts = Cuts::new(moves, &[Tool::new(1, shape, 6.0)], options.go_on)?;
+    find(Mesh { points: &points, faces: &faces }, &cuts, options)
 }
 
 /// Ripples are as high as r − √(r² − s²/4), a step apart, and lie between the first and the last pass and within their length.
@@ -114,12 +114,14 @@ fn refusals() {
     assert_eq!(search(&floor(), ball, &Options { go_on: &|| false, ..Options::default() }).err(), Some(Error::Stopped));
     let (points, faces) = scallops();
     let mesh = Mesh { points: &points, faces: &faces };
-    assert_eq!(find(mesh, &floor(), &[], &Options::default()).err(), Some(Error::Tool(1)));
+    assert_eq!(Cuts::new(&floor(), &[], &|| true).err(), Some(Error::Tool(1)));
+    let cuts = Cuts::new(&floor(), &[Tool::new(1, ball, 6.0)], &|| true).expect("cuts");
+    assert_eq!(find(mesh, &cuts, &Options { go_on: &|| false, ..Options::default() }).err(), Some(Error::Stopped));
     let corrections = Corrections { mask: &[true], ..Corrections::default() };
     let options = Options { corrections, ..Options::default() };
     assert_eq!(search(&floor(), ball, &options).err(), Some(Error::Mask { mask: 1, faces: faces.len() }));
     let mesh = Mesh { points: &points, faces: &[[0, 1, 9999]] };
-    assert_eq!(find(mesh, &floor(), &[], &Options::default()).err(), Some(Error::Vertex(0)));
+    assert_eq!(find(mesh, &cuts, &Options::default()).err(), Some(Error::Vertex(0)));
 }
 
 proptest::proptest! {
@@ -139,7 +141,7 @@ proptest::proptest! {
         for pair in ends.windows(2) {
             moves.push(&Move { from: pair[0], to: pair[1], kind: Way::Feed, axis, tool: 1, feed: 0.0, line: 1 });
         }
-        let families = families(&moves, std::slice::from_ref(&tool), &|| true).expect("families");
+        let cuts = Cuts::new(&moves, std::slice::from_ref(&tool), &|| true).expect("cuts");
         let profile = Profile::new(&tool, axis == UP).expect("a tool");
         let point = [x, y, z];
         // Samples along each move; between two of them the tool moves by less than 0.04.
@@ -150,7 +152,7 @@ proptest::proptest! {
                 least = least.min(profile.depth(sub(point, tip), axis));
             }
         }
-        let found = nearest(&families[0], point, 1e3, None, None, &mut Vec::new()).expect("a cut");
+        let found = nearest(&cuts.families[0], point, 1e3, None, None, &mut Vec::new()).expect("a cut");
         proptest::prop_assert!(found.distance <= least + 1e-9 && found.distance > least - 0.04, "{} {least}", found.distance);
     }
 }

@@ -88,7 +88,7 @@ pub(crate) struct Tree {
 }
 
 impl Tree {
-    /// Builds it in parallel; the order of runs is that of their keys and numbers, whatever the threads. O(n log n).
+    /// Builds it in parallel over the pieces with numbers below `pieces`; the order of runs is that of their keys and numbers, whatever the threads. O(n log n).
     pub(crate) fn new(pieces: usize, reach: &(impl Fn(u32) -> Option<Reach> + Sync)) -> Self {
         let mut runs = runs(reach, pieces);
         let mut leaves: Vec<Bounds> = runs.par_iter().map(|run| bounds(reach, *run)).collect();
@@ -104,6 +104,12 @@ impl Tree {
             levels.push(last.par_chunks(JOINED).map(|few| few.iter().fold(Bounds::NONE, Bounds::join)).collect());
         }
         Self { runs, levels }
+    }
+
+    /// The memory that it takes.
+    pub(crate) fn bytes(&self) -> u64 {
+        let boxes: usize = self.levels.iter().map(Vec::len).sum();
+        (self.runs.len() * size_of::<Run>() + boxes * size_of::<Bounds>()) as u64
     }
 
     /// Visits pieces in runs whose boxes `bound` lets pass, the least bound first: `bound` is lent the box and the best so far and
@@ -143,17 +149,14 @@ impl Tree {
     }
 }
 
-/// Runs of pieces that follow each other without a gap.
+/// Runs of pieces that follow each other; numbers that no piece has end a run.
 fn runs(reach: &impl Fn(u32) -> Option<Reach>, pieces: usize) -> Vec<Run> {
     let mut runs: Vec<Run> = Vec::new();
-    let mut end = None;
-    for piece in 0..pieces as u32 {
-        let Some(Reach { ends: [from, to], .. }) = reach(piece) else { break };
+    for piece in (0..pieces as u32).filter(|piece| reach(*piece).is_some()) {
         match runs.last_mut() {
-            Some(run) if (run.count as usize) < RUN && end == Some(from) => run.count += 1,
+            Some(run) if (run.count as usize) < RUN && run.first + run.count == piece => run.count += 1,
             _ => runs.push(Run { first: piece, count: 1 }),
         }
-        end = Some(to);
     }
     runs
 }

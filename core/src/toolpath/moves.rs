@@ -74,6 +74,15 @@ impl Moves {
         self.packed.len()
     }
 
+    /// The memory that they take.
+    #[must_use]
+    pub fn bytes(&self) -> u64 {
+        let of = |count: usize, each: usize| count as u64 * each as u64;
+        of(self.packed.len(), size_of::<Packed>())
+            + of(self.settings.len(), size_of::<Setting>())
+            + of(self.arcs.len(), size_of::<Arc>())
+    }
+
     /// Whether there are none.
     #[must_use]
     pub fn is_empty(&self) -> bool {
@@ -125,6 +134,7 @@ mod tests {
         let mut moves = Moves::default();
         list.iter().for_each(|one| moves.push(one));
         assert_eq!(moves.iter().collect::<Vec<_>>(), list);
+        assert_eq!(moves.bytes() as usize, 3 * size_of::<Packed>() + 2 * size_of::<Setting>() + size_of::<Arc>());
         assert_eq!(moves.get(3), None);
     }
 }

@@ -76,7 +76,7 @@ impl Step {
     fn bytes_a_triangle(&self) -> u64 {
         match self {
             Self::Features(_) => 1 << 10,
-            Self::Residue => 512,
+            Self::Residue => residue::BYTES_A_TRIANGLE,
             Self::Smooth | Self::Simplify => simplifying::BYTES_A_TRIANGLE,
         }
     }

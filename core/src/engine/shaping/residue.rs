@@ -1,5 +1,6 @@
 //! Residue of a tool, by the path that a profile names; or places that may be residue, where it wants them looked for without one.
 
+use std::ops::ControlFlow;
 use std::path::Path;
 
 use super::change::{Change, Told, is_moved, replaced, vertices_moved};
@@ -7,12 +8,16 @@ use super::corrections::{self, FromFiles, Origins};
 use crate::contract::report::{MOST_LISTED, Outcome, Report, Residue, ResidueRegion, ResidueSuspect};
 use crate::engine::mesh::Mesh;
 use crate::engine::work::Work;
-use crate::residue::{self, Corrections, FIT_LEAST, Fit, Found, Frame, Kind, Repaired};
+use crate::residue::{self, Corrections, Cuts, FIT_LEAST, Fit, Found, Frame, Kind, Repaired};
 use crate::simplify::{self, Input, Options};
 use crate::smooth;
-use crate::toolpath::{self, Program, Tool, project, tools};
+use crate::toolpath::{self, Header, Moves, Program, ReadError, Tool, project, tools};
 use crate::util::words::Counted;
 
+/// Memory for each triangle of the mesh while residue is taken away; measured: 194 (of 5 M) to 203 (of 0.5 M).
+pub(super) const BYTES_A_TRIANGLE: u64 = 208;
+/// A part of that: while the cuts of the path are there too; measured: 71, of 5 M.
+const SEARCH_BYTES_A_TRIANGLE: u64 = 80;
 /// Regions keep this share of their triangles, where that keeps to the surface.
 const SHARE: f64 = 0.2;
 /// Of the lowest region's height, the simplified surface may be so far from the moved one.
@@ -99,21 +104,31 @@ fn misfit(fit: Fit) -> Option<String> {
 /// The mesh without residue, by the path.
 fn removed(mesh: &Mesh, options: &residue::Options<'_>, work: Work<'_>) -> Result<Change, String> {
     let settings = &work.profile.residue;
-    let program = program(Path::new(&settings.toolpath), &settings.tools)?;
-    let view = residue::Mesh { points: mesh.vertices(), faces: mesh.faces() };
     let named = |error: residue::Error| format!("{}: {error}", settings.toolpath);
-    let (found, frame) = found(view, &program, options).map_err(named)?;
+    let Program { header, moves } = program(Path::new(&settings.toolpath), &settings.tools, work.limits.memory_bytes)?;
+    let cuts = Cuts::new(&moves, &header.tools, options.go_on).map_err(named)?;
+    // They may be larger than the mesh.
+    drop(moves);
+    let needed = cuts.bytes() + mesh.faces().len() as u64 * SEARCH_BYTES_A_TRIANGLE;
+    if needed > work.limits.memory_bytes {
+        return Err(too_much(Path::new(&settings.toolpath), work.limits.memory_bytes));
+    }
+    let view = residue::Mesh { points: mesh.vertices(), faces: mesh.faces() };
+    let (mut found, frame) = found(view, &cuts, options).map_err(named)?;
+    drop(cuts);
     if let Some(why_not) = misfit(found.fit) {
         let told = Residue { why_not: Some(why_not), path_fit: Some(found.fit.share()), ..Residue::default() };
         return Ok(Change { gone: Vec::new(), added: Vec::new(), told: Told::Residue(told) });
     }
-    let repaired = residue::repair(view, &found, options).map_err(named)?;
-    let mut told = told(&found, &program);
+    let mut repaired = residue::repair(view, &found, options).map_err(named)?;
+    found.targets = Vec::new();
+    let mut told = told(&found, &header);
     told.path_axes = frame.map(|frame| frame.to_string());
     if told.triangles_before == 0 {
         return Ok(Change { gone: Vec::new(), added: Vec::new(), told: Told::Residue(told) });
     }
     let settled = smooth::settle(mesh.vertices(), mesh.faces(), &repaired.points);
+    repaired.points = Vec::new();
     let fewer = fewer(mesh, (&found, &repaired), &settled.points, work)?;
     let (gone, added) = replaced(mesh, (&fewer.points, &fewer.faces, &fewer.origins));
     told.moved = vertices_moved(mesh, &settled.points);
@@ -125,47 +140,75 @@ fn removed(mesh: &Mesh, options: &residue::Options<'_>, work: Work<'_>) -> Resul
     Ok(Change { gone, added, told: Told::Residue(told) })
 }
 
-/// The path and its tools: tools of the profile count more than those of the path; a project of CAMotics names both.
-fn program(path: &Path, listed: &[String]) -> Result<Program, String> {
+/// The path and its tools: tools of the profile count more than those of the path; a project of CAMotics names both. Text and moves may take `most`
+/// bytes.
+fn program(path: &Path, listed: &[String], most: u64) -> Result<Program, String> {
     let shown = path.display();
-    let read = |path: &Path| std::fs::read(path).map_err(|error| format!("{}: cannot be read: {error}", path.display()));
     let tools: Result<Vec<Tool>, _> = listed.iter().map(|text| tools::parse(text)).collect();
     let mut options = toolpath::Options { tools: tools.map_err(|error| error.to_string())?, ..Default::default() };
-    let bytes = read(path)?;
-    match toolpath::read(&bytes, &options) {
-        Err(toolpath::ReadError::Project) => {
-            let project = project::read(&bytes).map_err(|error| format!("{shown}: {error}"))?;
+    let text = text(path, most)?;
+    match moves(&text, &options, most) {
+        Err(ReadError::Project) => {
+            let project = project::read(&text).map_err(|error| format!("{shown}: {error}"))?;
             let [file] = project.files.as_slice() else {
                 return Err(format!("{shown}: a project of {} tool paths; name one of them", project.files.len()));
             };
             let known: Vec<u32> = options.tools.iter().map(|tool| tool.number).collect();
             options.tools.extend(project.tools.into_iter().filter(|tool| !known.contains(&tool.number)));
             let beside = path.parent().unwrap_or(Path::new("")).join(file);
-            toolpath::read(&read(&beside)?, &options).map_err(|error| format!("{}: {error}", beside.display()))
+            let text = self::text(&beside, most)?;
+            moves(&text, &options, most).map_err(|error| refused(&beside, &error, most))
         }
-        other => other.map_err(|error| format!("{shown}: {error}")),
+        other => other.map_err(|error| refused(path, &error, most)),
     }
 }
 
+/// The text of a path, if it leaves half of the memory to the moves.
+fn text(path: &Path, most: u64) -> Result<Vec<u8>, String> {
+    let shown = path.display();
+    let length = std::fs::metadata(path).map_or(0, |about| about.len());
+    if length > most / 2 {
+        return Err(too_much(path, most));
+    }
+    std::fs::read(path).map_err(|error| format!("{shown}: cannot be read: {error}"))
+}
+
+/// The moves of a text, as long as both take no more than `most` bytes.
+fn moves(text: &[u8], options: &toolpath::Options, most: u64) -> Result<Program, ReadError> {
+    let most = most.saturating_sub(text.len() as u64);
+    let mut moves = Moves::default();
+    let header = toolpath::stream(text, options, &mut |one| {
+        moves.push(one);
+        if moves.bytes() > most { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    })?;
+    Ok(Program { header, moves })
+}
+
+fn refused(path: &Path, error: &ReadError, most: u64) -> String {
+    match error {
+        ReadError::Stopped { .. } => too_much(path, most),
+        error => format!("{}: {error}", path.display()),
+    }
+}
+
+fn too_much(path: &Path, most: u64) -> String {
+    format!("{}: the tool path takes more memory than the {} MiB that may be used", path.display(), most >> 20)
+}
+
 /// Residue in the axes of the mesh, and in which frame the path fits, if not as it is.
-fn found(
-    view: residue::Mesh<'_>,
-    program: &Program,
-    options: &residue::Options<'_>,
-) -> Result<(Found, Option<Frame>), residue::Error> {
-    let (moves, tools) = (&program.moves, &program.header.tools);
-    let found = residue::find(view, moves, tools, options)?;
+fn found(view: residue::Mesh<'_>, cuts: &Cuts, options: &residue::Options<'_>) -> Result<(Found, Option<Frame>), residue::Error> {
+    let found = residue::find(view, cuts, options)?;
     if found.fit.share() >= FIT_LEAST {
         return Ok((found, None));
     }
-    let Some(frame) = residue::frame(view, moves, tools, options)? else { return Ok((found, None)) };
+    let Some(frame) = residue::frame(view, cuts, options)? else { return Ok((found, None)) };
     let points: Vec<[f32; 3]> = view.points.iter().map(|point| frame.into_path(*point)).collect();
     let faces: Vec<[u32; 3]> = view.faces.iter().map(|face| frame.face(*face)).collect();
     let boxes = |boxes: &[residue::Region]| boxes.iter().map(|one| frame.of_box(*one)).collect::<Vec<_>>();
     let [include, exclude] = [options.corrections.include, options.corrections.exclude].map(boxes);
     let corrections = Corrections { include: &include, exclude: &exclude, ..options.corrections };
     let options = residue::Options { corrections, ..options.clone() };
-    let mut found = residue::find(residue::Mesh { points: &points, faces: &faces }, moves, tools, &options)?;
+    let mut found = residue::find(residue::Mesh { points: &points, faces: &faces }, cuts, &options)?;
     found.targets.iter_mut().for_each(|target| *target = frame.into_mesh(*target));
     Ok((found, Some(frame)))
 }
@@ -198,7 +241,7 @@ fn fewer(
     Ok(outcome)
 }
 
-fn told(found: &Found, program: &Program) -> Residue {
+fn told(found: &Found, header: &Header) -> Residue {
     let region = |region: &residue::RegionReport| ResidueRegion {
         kind: match region.kind {
             Kind::Stairs => "stairs".into(),
@@ -210,7 +253,7 @@ fn told(found: &Found, program: &Program) -> Residue {
         area: region.area,
         triangles: region.triangles as u64,
     };
-    let findings = program.header.findings.iter().take(FINDINGS);
+    let findings = header.findings.iter().take(FINDINGS);
     Residue {
         regions: found.regions.iter().take(MOST_LISTED).map(region).collect(),
         triangles_before: found.labels.iter().filter(|label| **label != u32::MAX).count() as u64,

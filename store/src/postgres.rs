@@ -61,16 +61,20 @@ mod step;
 mod submit;
 #[cfg(test)]
 mod tests;
+mod together;
 mod transfer;
 mod turns;
+mod write;
 
 use claim::Life;
 use database::{Again, Database, Failure, wait};
 use leases::Claims;
 use open::As;
 pub use open::{Shared, role};
-use step::By;
+use step::{Tried, Way};
+use together::Together;
 use turns::Folders;
+use write::By;
 
 /// The shared [`JobStore`].
 pub struct PostgresStore {
@@ -80,6 +84,7 @@ pub struct PostgresStore {
     database: Arc<Database>,
     life: Life,
     claims: Arc<Claims>,
+    together: Together,
     shut: Mutex<Vec<String>>,
     shares: Mutex<Shares>,
     /// Of the words that wake idle daemons.
@@ -120,8 +125,9 @@ impl PostgresStore {
     }
 
     fn over(open::Begun { runtime, end, database, life, claims, channel }: open::Begun) -> Self {
-        let (shut, shares, calls, looked) = (Mutex::default(), Mutex::default(), AtomicI64::new(1), Mutex::default());
-        Self { runtime: Some(runtime), end, database, life, claims, shut, shares, channel, calls, looked }
+        let (together, calls) = (Together::default(), AtomicI64::new(1));
+        let (shut, shares, looked) = (Mutex::default(), Mutex::default(), Mutex::default());
+        Self { runtime: Some(runtime), end, database, life, claims, together, shut, shares, channel, calls, looked }
     }
 
     /// Makes the store, or brings it up to date, and begins nothing: for the owner of its schema.
@@ -152,6 +158,10 @@ impl PostgresStore {
         self.call(Again::Yes, call)
     }
 
+    fn way<'a>(&'a self, tried: &'a Mutex<Tried>) -> Way<'a> {
+        Way { together: &self.together, clock: &*self.life.machine, tried }
+    }
+
     fn served(&self) -> Option<&[String]> {
         self.life.folders.as_deref()
     }
@@ -177,31 +187,21 @@ impl PostgresStore {
 
     fn take_back(&self) -> Result<Option<Claim>, StoreError> {
         let shut = self.folders_shut();
-        self.ask(async |connection| claim::take_back(connection, &self.life, &shut).await)
+        let found = self.ask(async |connection| claim::take_back(connection, &self.life, &shut).await)?;
+        found.iter().for_each(|claim| self.claims.keep(claim, None));
+        Ok(found)
     }
 
     fn next(&self, want: &Filter) -> Result<Option<Claim>, StoreError> {
         let (folders, call, tries) = (self.folders(), self.calls.fetch_add(1, Ordering::Relaxed), AtomicU32::new(0));
-        self.ask(async |connection| {
+        let found = self.ask(async |connection| {
             let again = tries.fetch_add(1, Ordering::Relaxed) > 0;
             claim::claim(connection, &self.life, want, &folders, call, again).await
-        })
-    }
-
-    fn find_claim(&self, want: &Filter) -> Result<Option<Claim>, StoreError> {
-        let has_looked = self.is_time_to_look();
-        if has_looked && let Some(claim) = self.take_back()? {
-            return Ok(Some(claim));
-        }
-        let found = self.next(want)?;
-        if found.is_some() || has_looked {
-            return Ok(found);
-        }
-        // With nothing else to do, what others have lost is wanted at once.
-        match self.take_back()? {
-            Some(claim) => Ok(Some(claim)),
-            None => self.next(want),
-        }
+        })?;
+        Ok(found.map(|(claim, seen)| {
+            self.claims.keep(&claim, seen);
+            claim
+        }))
     }
 }
 
@@ -246,9 +246,19 @@ impl JobStore for PostgresStore {
     }
 
     fn claim(&self, want: &Filter) -> Result<Option<Claim>, StoreError> {
-        let claim = self.find_claim(want)?;
-        claim.iter().for_each(|claim| self.claims.keep(claim));
-        Ok(claim)
+        let has_looked = self.is_time_to_look();
+        if has_looked && let Some(claim) = self.take_back()? {
+            return Ok(Some(claim));
+        }
+        let found = self.next(want)?;
+        if found.is_some() || has_looked {
+            return Ok(found);
+        }
+        // With nothing else to do, what others have lost is wanted at once.
+        match self.take_back()? {
+            Some(claim) => Ok(Some(claim)),
+            None => self.next(want),
+        }
     }
 
     fn has_parked(&self) -> Result<bool, StoreError> {
@@ -279,36 +289,46 @@ impl JobStore for PostgresStore {
 
     fn advance(&self, claim: &Claim, step: Step) -> Result<Job, StoreError> {
         let by = By::Holder { token: claim.token, lease: self.life.lease };
-        let tried = Mutex::new(None);
+        let tried = Tried::knowing(self.claims.seen(claim));
         let stepped = self.ask(async |connection| {
-            step::transition(connection, claim.id, by, &tried, |stored| {
+            step::transition(connection, claim.id, by, self.way(&tried), |stored| {
                 let is_held = stored.token == Some(claim.token) && stored.epoch == Some(self.life.epoch);
                 is_held.then(|| Event::Step { token: claim.token, step: step.clone() }).ok_or(Illegal::Fenced)
             })
             .await
         });
-        let is_over = match &stepped {
-            Ok(job) => job.hold().is_none(),
-            Err(StoreError::Illegal { source, .. }) => *source == Illegal::Fenced,
-            Err(_) => false,
-        };
-        if is_over {
-            self.claims.end(claim);
+        match stepped {
+            Ok(seen) => {
+                let job = seen.stored.job.clone();
+                if job.hold().is_some() {
+                    self.claims.go_on(claim, seen)
+                } else {
+                    self.claims.end(claim)
+                }
+                Ok(job)
+            }
+            Err(error) => {
+                if matches!(error, StoreError::Illegal { source: Illegal::Fenced, .. }) {
+                    self.claims.end(claim);
+                }
+                Err(error)
+            }
         }
-        stepped
     }
 
     fn control(&self, id: JobId, wish: Control) -> Result<Job, StoreError> {
         let event = Event::from(wish);
-        let tried = Mutex::new(None);
-        self.ask(async |connection| step::transition(connection, id, By::Operator, &tried, |_| Ok(event.clone())).await)
+        let tried = Tried::knowing(None);
+        let way = self.way(&tried);
+        let seen = self.ask(async |connection| step::transition(connection, id, By::Operator, way, |_| Ok(event.clone())).await);
+        Ok(seen?.stored.job)
     }
 
     fn recover(&self, testimony: &dyn Fn(&Job) -> Testimony) -> Result<Vec<Recovered>, StoreError> {
         let orphans = self.ask(async |connection| recover::orphans(connection, &self.life).await)?;
         let verdicts = recover::ask(&orphans, &self.life, testimony);
         let recovered = self.call(Again::No, async |connection| recover::take_back(connection, &self.life, &verdicts).await)?;
-        recovered.iter().filter_map(|one| one.claim.as_ref()).for_each(|claim| self.claims.keep(claim));
+        recovered.iter().filter_map(|one| one.claim.as_ref()).for_each(|claim| self.claims.keep(claim, None));
         Ok(recovered)
     }
 

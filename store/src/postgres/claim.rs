@@ -9,9 +9,10 @@ use sqlx::postgres::PgConnection;
 use sqlx::{Connection, Row};
 
 use super::database::Failure;
-use super::row::{Columns, Stored, int, number};
-use super::step::{By, set};
+use super::row::{Stored, int, number};
+use super::step::Seen;
 use super::turns::{Folders, alone};
+use super::write::{By, Write, one};
 use crate::host::Station;
 use crate::id::{Clock, Epoch, Time, Token};
 use crate::job::{Event, Job, Priority, State, Testimony};
@@ -39,7 +40,7 @@ pub(super) struct Life {
     pub(super) station: Arc<Mutex<Station>>,
     /// Only jobs of these hot folders are its business; `None`: all are.
     pub(super) folders: Option<Vec<String>>,
-    /// Says which start of the machine this is, and nothing else.
+    /// Says which start of the machine this is, and counts milliseconds on from a time of the database's, and nothing else.
     pub(super) machine: Arc<dyn Clock>,
     /// In ms.
     pub(super) lease: i64,
@@ -62,7 +63,7 @@ pub(super) async fn check(connection: &mut PgConnection, life: &Life) -> Result<
     row.map(|_| ()).ok_or_else(|| life.over().into())
 }
 
-/// As [`crate::JobStore::claim`]. `call` names it among all of this life, so that a try whose answer was lost is found again.
+/// As [`crate::JobStore::claim`], with the row as it is then. `call` names it among all of this life, so that a try whose answer was lost is found again.
 pub(super) async fn claim(
     connection: &mut PgConnection,
     life: &Life,
@@ -70,9 +71,9 @@ pub(super) async fn claim(
     folders: &Folders,
     call: i64,
     again: bool,
-) -> Result<Option<Claim>, Failure> {
+) -> Result<Option<(Claim, Option<Seen>)>, Failure> {
     if again && let Some(claim) = made(connection, life, call).await? {
-        return Ok(Some(claim));
+        return Ok(Some((claim, None)));
     }
     for round in 0..ROUNDS {
         let query = sqlx::query(CLAIM)
@@ -96,7 +97,8 @@ pub(super) async fn claim(
             query.fetch_one(&mut *connection).await?
         };
         if row.try_get::<Option<i64>, _>("id")?.is_some() {
-            return Ok(Some(claim_of(Stored::read(&row)?)?));
+            let seen = Seen::new(Stored::read(&row)?, Time(number(row.try_get("now")?)), &*life.machine);
+            return Ok(Some((claim_of(&seen.stored)?, Some(seen))));
         }
         if !row.try_get::<bool, _>("is_alive")? {
             return Err(life.over().into());
@@ -114,13 +116,13 @@ async fn made(connection: &mut PgConnection, life: &Life, call: i64) -> Result<O
     let sql =
         "SELECT id, seq, record, epoch, token, claim_token, claim_boot, claim_at FROM jobs WHERE epoch = $1 AND claim_call = $2";
     let row = sqlx::query(sql).bind(int(life.epoch.0)).bind(call).fetch_optional(connection).await?;
-    row.map(|row| claim_of(Stored::read(&row)?)).transpose()
+    row.map(|row| claim_of(&Stored::read(&row)?)).transpose()
 }
 
-fn claim_of(stored: Stored) -> Result<Claim, Failure> {
+fn claim_of(stored: &Stored) -> Result<Claim, Failure> {
     let id = stored.job.id;
     let token = stored.token.ok_or(StoreError::Illegal { id, source: crate::job::Illegal::Fenced })?;
-    Ok(Claim { id, token, job: stored.job })
+    Ok(Claim { id, token, job: stored.job.clone() })
 }
 
 /// Takes back jobs whose leases have run out. One whose result was on its way comes with a new claim: nothing else is to be done for it.
@@ -137,7 +139,7 @@ pub(super) async fn take_back(connection: &mut PgConnection, life: &Life, shut: 
         // Whoever is away says nothing, and no one can look there for a witness.
         let after = inherit(&stored.job, life, token, false, Testimony::None, now)?;
         let by = By::Heir { lease: life.lease };
-        let Some(seq) = set(&mut transaction, &stored, &after, &Columns::of(&after)?, by).await? else { continue };
+        let Some((seq, _)) = one(&mut transaction, &Write::new(&stored, &after, by, None)?).await? else { continue };
         transaction.commit().await?;
         tracing::warn!(job = after.id.0, "The lease of a job ran out: its daemon is gone, stopped or cut off. It is taken back.");
         if after.hold().is_some() {

@@ -12,29 +12,50 @@ use super::claim::{Life, extend};
 use super::database::{Again, Database, Failure, wait};
 use super::hosts::see;
 use super::row::int;
+use super::step::Seen;
 use crate::id::{Epoch, JobId, Token};
 use crate::store::Claim;
 
+/// A claim that was given out.
+struct Kept {
+    token: Token,
+    /// Its row as it was left by this life.
+    seen: Option<Seen>,
+}
+
 /// The claims that this life has given out and that have not ended. One whose answer was lost on the way is not among them, and runs out.
 #[derive(Default)]
-pub(super) struct Claims(Mutex<BTreeMap<JobId, Token>>);
+pub(super) struct Claims(Mutex<BTreeMap<JobId, Kept>>);
 
 impl Claims {
-    fn lock(&self) -> MutexGuard<'_, BTreeMap<JobId, Token>> {
+    fn lock(&self) -> MutexGuard<'_, BTreeMap<JobId, Kept>> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     fn tokens(&self) -> Vec<Token> {
-        self.lock().values().copied().collect()
+        self.lock().values().map(|kept| kept.token).collect()
     }
 
-    pub(super) fn keep(&self, claim: &Claim) {
-        self.lock().insert(claim.id, claim.token);
+    /// `seen`: its row as it was written just now, if it is known.
+    pub(super) fn keep(&self, claim: &Claim, seen: Option<Seen>) {
+        self.lock().insert(claim.id, Kept { token: claim.token, seen });
+    }
+
+    /// The row as it was left, for the one step that comes next.
+    pub(super) fn seen(&self, claim: &Claim) -> Option<Seen> {
+        self.lock().get_mut(&claim.id).filter(|kept| kept.token == claim.token)?.seen.take()
+    }
+
+    /// The step was made, and the claim goes on.
+    pub(super) fn go_on(&self, claim: &Claim, seen: Seen) {
+        if let Some(kept) = self.lock().get_mut(&claim.id).filter(|kept| kept.token == claim.token) {
+            kept.seen = Some(seen);
+        }
     }
 
     pub(super) fn end(&self, claim: &Claim) {
         let mut claims = self.lock();
-        if claims.get(&claim.id) == Some(&claim.token) {
+        if claims.get(&claim.id).is_some_and(|kept| kept.token == claim.token) {
             claims.remove(&claim.id);
         }
     }

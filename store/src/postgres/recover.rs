@@ -7,9 +7,9 @@ use sqlx::{Connection, Row};
 
 use super::claim::{Life, inherit};
 use super::database::Failure;
-use super::row::{Columns, Stored, int, number};
-use super::step::{By, set};
+use super::row::{Stored, int, number};
 use super::submit::head;
+use super::write::{By, Write, one};
 use crate::id::{JobId, Time, Token};
 use crate::job::{Event, Job, State, Testimony};
 use crate::store::{Claim, Recovered, StoreError};
@@ -94,8 +94,8 @@ async fn wake_parked(transaction: &mut PgTransaction<'_>, life: &Life, now: Time
 /// Writes a row that this transaction has locked.
 async fn write(transaction: &mut PgTransaction<'_>, stored: &Stored, after: Job, life: &Life) -> Result<Job, Failure> {
     let by = By::Heir { lease: life.lease };
-    let seq = set(transaction, stored, &after, &Columns::of(&after)?, by).await?;
-    let seq = seq.ok_or_else(|| StoreError::Poisoned { reason: format!("job {} changed under its lock", after.id) })?;
+    let seq = one(transaction, &Write::new(stored, &after, by, None)?).await?;
+    let (seq, _) = seq.ok_or_else(|| StoreError::Poisoned { reason: format!("job {} changed under its lock", after.id) })?;
     Ok(Job { seq, ..after })
 }
 

@@ -25,6 +25,7 @@ pub(super) fn number(int: i64) -> u64 {
 }
 
 /// A job, and who holds its row.
+#[derive(Clone)]
 pub(super) struct Stored {
     pub(super) job: Job,
     /// The bytes of the record; a claim may have come since.
@@ -63,10 +64,10 @@ impl Stored {
 }
 
 impl Stored {
-    /// The job as its record has it, whoever may have claimed it since.
-    pub(super) fn written(&self) -> Result<Job, StoreError> {
+    /// With the job as its record has it, whoever may have claimed it since.
+    pub(super) fn written(self) -> Result<Self, StoreError> {
         let job: Job = record::decode(Table::Jobs, &self.job.id.0.to_be_bytes(), &self.record)?;
-        Ok(Job { seq: self.job.seq, ..job })
+        Ok(Self { job: Job { seq: self.job.seq, ..job }, ..self })
     }
 }
 

@@ -8,7 +8,7 @@ use sqlx::{Connection, Row};
 
 use super::database::Failure;
 use super::row::{Columns, Stored, identity, int, number};
-use super::step::{By, set};
+use super::write::{By, Write, one};
 use crate::id::{JobId, Time, Token};
 use crate::job::{Event, Job, Kind, Past};
 use crate::queue::past::HIGHEST;
@@ -55,7 +55,7 @@ async fn try_submit(transaction: &mut PgTransaction<'_>, found: &[Submission]) -
                 let id = noticed.job.id;
                 let wanted = noticed.job.after(&Event::Want(submission.priority), now);
                 let wanted = wanted.map_err(|source| StoreError::Illegal { id, source })?;
-                if set(transaction, noticed, &wanted, &Columns::of(&wanted)?, By::Operator).await?.is_none() {
+                if one(transaction, &Write::new(noticed, &wanted, By::Operator, None)?).await?.is_none() {
                     return Ok(None);
                 }
                 id

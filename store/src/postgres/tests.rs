@@ -18,6 +18,7 @@ mod outage;
 mod schema;
 mod served;
 mod server;
+mod steps;
 mod transfer;
 
 use server::{Schemas, Server, server};

@@ -3,7 +3,9 @@
 -- Connections are told to prefer indexes (`open.rs`): in a new database nothing is known of how many rows there are.
 -- Each step of priority takes 1,800,000 ms of waiting.
 WITH t AS MATERIALIZED (
-    SELECT suture_now() AS now
+    SELECT suture_now() AS now, l.is_alive, d.is_draining
+    FROM (SELECT EXISTS (SELECT 1 FROM lives WHERE epoch = $1 AND NOT is_over) AS is_alive) l
+    CROSS JOIN (SELECT EXISTS (SELECT 1 FROM lives l JOIN drains d ON d.name IN (l.daemon, l.host) WHERE l.epoch = $1) AS is_draining) d
 ), folders AS MATERIALIZED (
     SELECT name, turn FROM suture_turns($8, $9, $10, $11, $12, $13)
 ), heads AS MATERIALIZED (
@@ -53,9 +55,10 @@ WITH t AS MATERIALIZED (
 ), candidates AS MATERIALIZED (
     SELECT * FROM ready UNION ALL SELECT * FROM rested UNION ALL SELECT * FROM parked
 ), pick AS MATERIALIZED (
+    -- In their order already, so that no more rows are looked at than others hold, and one.
     SELECT j.id, CASE WHEN c.kind = 'parked' THEN j.turn ELSE c.turn END AS turn
-    FROM candidates c JOIN jobs j ON j.id = c.id
-    WHERE j.kind = c.kind AND EXISTS (SELECT 1 FROM lives WHERE epoch = $1 AND NOT is_over) AND NOT suture_drains($1)
+    FROM (SELECT * FROM candidates ORDER BY rank DESC, turn, id) c JOIN jobs j ON j.id = c.id
+    WHERE j.kind = c.kind AND (SELECT is_alive AND NOT is_draining FROM t)
     ORDER BY c.rank DESC, c.turn, c.id
     LIMIT 1
     FOR UPDATE OF j SKIP LOCKED
@@ -70,6 +73,5 @@ WITH t AS MATERIALIZED (
     RETURNING j.id, j.seq, j.record, j.epoch, j.token, j.claim_token, j.claim_boot, j.claim_at
 )
 SELECT id, seq, record, epoch, token, claim_token, claim_boot, claim_at,
-    (SELECT count(*) FROM candidates) AS candidates, suture_drains($1) AS is_draining,
-    EXISTS (SELECT 1 FROM lives WHERE lives.epoch = $1 AND NOT is_over) AS is_alive
+    (SELECT count(*) FROM candidates) AS candidates, t.is_draining, t.is_alive, t.now
 FROM t LEFT JOIN claimed ON true

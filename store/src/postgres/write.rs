@@ -1,0 +1,136 @@
+//! Rows as they are to be written: compare and set, any number of them in one statement.
+
+use sqlx::Row;
+use sqlx::postgres::{PgConnection, PgRow};
+
+use super::database::Failure;
+use super::outbox;
+use super::row::{Columns, Stored, int, number};
+use crate::id::{Seq, Time, Token};
+use crate::job::{Job, State};
+use crate::record;
+use crate::store::StoreError;
+
+const WRITE: &str = include_str!("sql/write.sql");
+/// The same of one row, at less cost. $18 as there.
+const WRITE_ONE: &str = "SELECT CASE WHEN $18::bigint IS NULL OR abs(suture_now() - $18) <= 1000
+    THEN suture_write($1, $2, $3, $4, $5, $6, $7, $8, $9, $10, $11, $12, $13, $14, $15, $16, $17) END AS seq, suture_now() AS now";
+
+/// Who may write.
+#[derive(Clone, Copy)]
+pub(super) enum By {
+    /// Whoever holds the claim; its lease, in ms, begins anew.
+    Holder { token: Token, lease: i64 },
+    /// Whoever takes over what another life held; the lease, in ms, begins anew.
+    Heir { lease: i64 },
+    /// Anyone.
+    Operator,
+}
+
+/// A job's row to come.
+pub(super) struct Write {
+    pub(super) columns: Columns,
+    /// The transition in whose place it comes.
+    seq: i64,
+    /// The token that the row must have.
+    needed: Option<i64>,
+    epoch: Option<i64>,
+    token: Option<i64>,
+    lease: Option<i64>,
+    /// The entry for subscribers where the job ends by it.
+    ended: Option<Vec<u8>>,
+    counted: Option<i64>,
+}
+
+/// The transition that was made, and the database's time; `None`: nothing was written, since something else is there meanwhile.
+pub(super) type Written = Option<(Seq, Time)>;
+
+impl Write {
+    /// `after` in the place of what was read. `counted`: the time that it was made with, where the database was not asked for it.
+    pub(super) fn new(before: &Stored, after: &Job, by: By, counted: Option<Time>) -> Result<Self, StoreError> {
+        let hold = after.hold();
+        // A claim that was void before does not come to life by what an operator says.
+        let token = match by {
+            By::Holder { .. } | By::Heir { .. } => hold.map(|hold| hold.token),
+            By::Operator => hold.map(|hold| hold.token).filter(|token| Some(*token) == before.token),
+        };
+        let (needed, lease) = match by {
+            By::Holder { token, lease } => (Some(int(token.0)), Some(lease)),
+            By::Heir { lease } => (None, Some(lease)),
+            By::Operator => (None, None),
+        };
+        let ends = matches!(after.state, State::Ended { .. }) && before.job.state != after.state;
+        Ok(Self {
+            columns: Columns::of(after)?,
+            seq: int(before.job.seq.0),
+            needed,
+            epoch: hold.map(|hold| int(hold.epoch.0)),
+            token: token.map(|token| int(token.0)),
+            lease,
+            ended: ends.then(|| record::encode_end(&outbox::key(Some(after.id)), after)).transpose()?,
+            counted: counted.map(|counted| int(counted.0)),
+        })
+    }
+}
+
+/// Writes one.
+pub(super) async fn one(connection: &mut PgConnection, write: &Write) -> Result<Written, Failure> {
+    let Write { columns, .. } = write;
+    let row = sqlx::query(WRITE_ONE)
+        .bind(columns.id)
+        .bind(write.seq)
+        .bind(write.needed)
+        .bind(&columns.record)
+        .bind(columns.kind)
+        .bind(columns.kind_claimed)
+        .bind(columns.priority)
+        .bind(columns.since)
+        .bind(columns.not_before)
+        .bind(columns.alone)
+        .bind(columns.cancel)
+        .bind(columns.recipe)
+        .bind(write.epoch)
+        .bind(write.token)
+        .bind(write.lease)
+        .bind(columns.is_fresh)
+        .bind(&write.ended)
+        .bind(write.counted);
+    written(&row.fetch_one(connection).await?)
+}
+
+fn written(row: &PgRow) -> Result<Written, Failure> {
+    let (seq, now): (Option<i64>, i64) = (row.try_get("seq")?, row.try_get("now")?);
+    Ok(seq.map(|seq| (Seq(number(seq)), Time(number(now)))))
+}
+
+/// Writes them, each for itself, in one transaction. They are in the order of their jobs, so that two such calls never wait for each other in a circle.
+pub(super) async fn all(connection: &mut PgConnection, writes: &[Write]) -> Result<Vec<Written>, Failure> {
+    fn each<'a, T>(writes: &'a [Write], part: impl Fn(&'a Write) -> T) -> Vec<T> {
+        writes.iter().map(part).collect()
+    }
+    if let [write] = writes {
+        return Ok(vec![one(connection, write).await?]);
+    }
+    let rows = sqlx::query(WRITE)
+        .bind(each(writes, |write| write.columns.id))
+        .bind(each(writes, |write| write.seq))
+        .bind(each(writes, |write| write.needed))
+        .bind(each(writes, |write| write.columns.record.as_slice()))
+        .bind(each(writes, |write| write.columns.kind))
+        .bind(each(writes, |write| write.columns.kind_claimed))
+        .bind(each(writes, |write| write.columns.priority))
+        .bind(each(writes, |write| write.columns.since))
+        .bind(each(writes, |write| write.columns.not_before))
+        .bind(each(writes, |write| write.columns.alone))
+        .bind(each(writes, |write| write.columns.cancel))
+        .bind(each(writes, |write| write.columns.recipe))
+        .bind(each(writes, |write| write.epoch))
+        .bind(each(writes, |write| write.token))
+        .bind(each(writes, |write| write.lease))
+        .bind(each(writes, |write| write.columns.is_fresh))
+        .bind(each(writes, |write| write.ended.as_deref()))
+        .bind(each(writes, |write| write.counted))
+        .fetch_all(connection)
+        .await?;
+    rows.iter().map(written).collect()
+}

@@ -26,6 +26,8 @@ mod queue;
 mod record;
 mod role;
 mod share;
+#[cfg(test)]
+mod simulation;
 mod sled_store;
 pub mod stall;
 pub mod store;

@@ -55,7 +55,7 @@ impl MemoryStore {
 type Entries = BTreeMap<(Table, Vec<u8>), Vec<u8>>;
 
 #[derive(Default)]
-struct Memory(RwLock<Entries>);
+pub(crate) struct Memory(RwLock<Entries>);
 
 impl Tables for Memory {
     fn get(&self, table: Table, key: &[u8]) -> Result<Option<Vec<u8>>, StoreError> {

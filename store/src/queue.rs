@@ -255,6 +255,45 @@ impl<T: Tables> Queue<T> {
         Ok(after)
     }
 
+    /// As [`JobStore::claim`], for the life of that number.
+    pub(crate) fn claim_for(&self, epoch: Epoch, want: &Filter) -> Result<Option<Claim>, StoreError> {
+        self.tables.sound()?;
+        let mut inner = self.lock();
+        let now = self.now();
+        let Some(id) = inner.line.first(want, now) else { return Ok(None) };
+        let before = self.known(id)?;
+        let mut head = inner.head;
+        head.seq.0 += 1;
+        let token = Token(head.seq.0);
+        let event = Event::Claim { epoch, token, boot: self.clock.boot() };
+        let mut job = before.after(&event, now.wall).map_err(|source| StoreError::Illegal { id, source })?;
+        job.seq = head.seq;
+        // Before it is durable: where that fails, the store begins anew, and so do turns.
+        inner.line.begin_turn(id);
+        self.commit(inner, head, &[(Some(&before), &job)])?;
+        self.settle(head)?;
+        Ok(Some(Claim { id, token, job }))
+    }
+
+    /// As [`JobStore::advance`], by the life of that number.
+    pub(crate) fn advance_for(&self, epoch: Epoch, claim: &Claim, step: Step) -> Result<Job, StoreError> {
+        self.transition(claim.id, |job, _| match job.hold() {
+            Some(hold) if hold.epoch == epoch => Ok(Event::Step { token: claim.token, step }),
+            _ => Err(Illegal::Fenced),
+        })
+    }
+
+    /// As [`JobStore::heartbeat`], of the life of that number.
+    pub(crate) fn holds(&self, epoch: Epoch, claim: &Claim) -> Result<Lease, StoreError> {
+        let job = self.known(claim.id)?;
+        Ok(match (job.hold(), &job.state) {
+            (Some(hold), _) if hold.token != claim.token || hold.epoch != epoch => Lease::Lost,
+            (Some(_), State::Running { cancel: true, .. }) => Lease::Cancel,
+            (Some(_), _) => Lease::Held,
+            (None, _) => Lease::Lost,
+        })
+    }
+
     fn settle(&self, head: Head) -> Result<(), StoreError> {
         self.tables.settle((head.epoch, head.seq))?;
         crash_point("store.commit.durable");
@@ -278,22 +317,7 @@ impl<T: Tables> JobStore for Queue<T> {
     }
 
     fn claim(&self, want: &Filter) -> Result<Option<Claim>, StoreError> {
-        self.tables.sound()?;
-        let mut inner = self.lock();
-        let now = self.now();
-        let Some(id) = inner.line.first(want, now) else { return Ok(None) };
-        let before = self.known(id)?;
-        let mut head = inner.head;
-        head.seq.0 += 1;
-        let token = Token(head.seq.0);
-        let event = Event::Claim { epoch: head.epoch, token, boot: self.clock.boot() };
-        let mut job = before.after(&event, now.wall).map_err(|source| StoreError::Illegal { id, source })?;
-        job.seq = head.seq;
-        // Before it is durable: where that fails, the store begins anew, and so do turns.
-        inner.line.begin_turn(id);
-        self.commit(inner, head, &[(Some(&before), &job)])?;
-        self.settle(head)?;
-        Ok(Some(Claim { id, token, job }))
+        self.claim_for(self.epoch(), want)
     }
 
     fn has_parked(&self) -> Result<bool, StoreError> {
@@ -313,21 +337,11 @@ impl<T: Tables> JobStore for Queue<T> {
     }
 
     fn heartbeat(&self, claim: &Claim) -> Result<Lease, StoreError> {
-        let epoch = self.epoch();
-        let job = self.known(claim.id)?;
-        Ok(match (job.hold(), &job.state) {
-            (Some(hold), _) if hold.token != claim.token || hold.epoch != epoch => Lease::Lost,
-            (Some(_), State::Running { cancel: true, .. }) => Lease::Cancel,
-            (Some(_), _) => Lease::Held,
-            (None, _) => Lease::Lost,
-        })
+        self.holds(self.epoch(), claim)
     }
 
     fn advance(&self, claim: &Claim, step: Step) -> Result<Job, StoreError> {
-        self.transition(claim.id, |job, head| match job.hold() {
-            Some(hold) if hold.epoch == head.epoch => Ok(Event::Step { token: claim.token, step }),
-            _ => Err(Illegal::Fenced),
-        })
+        self.advance_for(self.epoch(), claim, step)
     }
 
     fn control(&self, id: JobId, wish: Control) -> Result<Job, StoreError> {

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use crate::id::{Clock, Time};
 use crate::store::StoreError;
 
+mod chance;
 mod claims;
 mod deaths;
 mod history;
@@ -18,6 +19,7 @@ mod turns;
 
 #[cfg(feature = "testkit")]
 pub use crate::crash::at_crash_points;
+pub use chance::Chance;
 pub use tools::{ManualClock, Subject, dropped, result_of};
 
 type Check = fn(&mut dyn Subject, &ManualClock) -> Result<(), StoreError>;

@@ -5,7 +5,6 @@
 //! One seed is one night. When one fails, its last steps are told, and `SUTURE_SEED=n cargo test -p suture --release a_seed_of_choice` has it again.
 
 mod audit;
-mod chance;
 mod life;
 mod matter;
 mod oracle;
@@ -19,10 +18,10 @@ use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::rc::Rc;
 use std::time::Duration;
 
-use chance::Chance;
 use plan::Plan;
 use stage::{Scale, Stage};
 use suture_store::job::Kind;
+use suture_store::testkit::Chance;
 
 use crate::world::World;
 

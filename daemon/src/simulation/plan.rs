@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::chance::Chance;
+use suture_store::testkit::Chance;
 
 /// Hot folders. Originals stay in the second one.
 pub(super) const FOLDERS: [&str; 2] = ["hot", "left"];

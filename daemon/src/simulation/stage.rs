@@ -11,8 +11,8 @@ use std::time::Duration;
 
 use suture_core::report::Outcome;
 use suture_core::{ErrorClass, Report};
+use suture_store::testkit::Chance;
 
-use super::chance::Chance;
 use super::life::Life;
 use super::matter::{Fate, Matter};
 use super::oracle::Oracle;

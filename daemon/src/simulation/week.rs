@@ -3,7 +3,8 @@
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
-use super::chance::Chance;
+use suture_store::testkit::Chance;
+
 use super::matter::{FATES, Fate};
 use super::plan::{LEFT, Plan};
 use super::stage::{Scale, Stage};

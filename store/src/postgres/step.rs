@@ -44,7 +44,7 @@ impl Seen {
     }
 }
 
-/// What is known of a call between its tries, and of its job before the first.
+/// All that is known of a call between its tries, and of its job before the first.
 #[derive(Default)]
 pub(super) struct Tried {
     /// The row as the holder left it: for one look.
@@ -87,7 +87,7 @@ pub(super) async fn transition(
     let (clock, tried) = (way.clock, || way.tried.lock().unwrap_or_else(std::sync::PoisonError::into_inner));
     for _ in 0..ROUNDS {
         let known = tried().known.take();
-        // What is only known may be out of date: nothing is refused by it.
+        // A row that is only known may be out of date: nothing is refused by it.
         let known = known.and_then(|known| {
             let now = known.now(clock);
             let after = event(&known.stored).and_then(|event| known.stored.job.after(&event, now)).ok()?;

@@ -54,7 +54,7 @@ impl Together {
             match all(connection, &writes).await {
                 Ok(written) => tells.into_iter().zip(written).for_each(|(tell, written)| _ = tell.send(written)),
                 Err(failure) => {
-                    // Those who wait hear that nothing is known.
+                    // Whoever waits hears that nothing is known.
                     drop(tells);
                     drop(turn);
                     return match told.try_recv() {

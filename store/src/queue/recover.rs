@@ -32,7 +32,8 @@ impl<T: Tables> Queue<T> {
         let mut recovered = Vec::with_capacity(orphans.len());
         for job in &orphans {
             let testimony = said.get(&job.id).copied().unwrap_or(Testimony::None);
-            recovered.push(take_back(job, &mut head, alone(job), testimony, now)?);
+            let heir = head.epoch;
+            recovered.push(take_back(job, &mut head, heir, (alone(job), testimony), now)?);
         }
         let parked = self.wake_parked(&mut head, now)?;
         if recovered.is_empty() && parked.is_empty() {
@@ -42,6 +43,17 @@ impl<T: Tables> Queue<T> {
         let mut changes: Vec<_> = orphans.iter().zip(&recovered).map(|(from, to)| (Some(from), &to.job)).collect();
         changes.extend(parked.iter().map(|(from, to)| (Some(from), to)));
         self.commit(inner, head, &changes)?;
+        self.settle(head)?;
+        Ok(recovered)
+    }
+
+    /// Takes one job back whose lease has run out, or whose daemon begins anew, where several daemons share the tables.
+    #[cfg(test)]
+    pub(crate) fn take_back_one(&self, id: JobId, heir: Epoch, testimony: Testimony) -> Result<Recovered, StoreError> {
+        let inner = self.lock();
+        let (before, mut head) = (self.known(id)?, inner.head);
+        let recovered = take_back(&before, &mut head, heir, (false, testimony), self.clock.now())?;
+        self.commit(inner, head, &[(Some(&before), &recovered.job)])?;
         self.settle(head)?;
         Ok(recovered)
     }
@@ -75,8 +87,14 @@ impl<T: Tables> Queue<T> {
     }
 }
 
-/// One orphan after the death of its daemon; counts on in `head`.
-fn take_back(job: &Job, head: &mut Head, alone: bool, testimony: Testimony, now: Time) -> Result<Recovered, StoreError> {
+/// One orphan after the death of its daemon, taken back by the life `heir`; counts on in `head`. Was it alone, and what is known of the end?
+fn take_back(
+    job: &Job,
+    head: &mut Head,
+    heir: Epoch,
+    (alone, testimony): (bool, Testimony),
+    now: Time,
+) -> Result<Recovered, StoreError> {
     let illegal = |source| StoreError::Illegal { id: job.id, source };
     let void = job.hold().map(|hold| hold.token).unwrap_or_default();
     head.seq.0 += 1;
@@ -87,7 +105,7 @@ fn take_back(job: &Job, head: &mut Head, alone: bool, testimony: Testimony, now:
     let token = Token(head.seq.0);
     let held = after.hold().is_some();
     if held {
-        after = after.after(&Event::Reclaim { epoch: head.epoch, token }, now).map_err(illegal)?;
+        after = after.after(&Event::Reclaim { epoch: heir, token }, now).map_err(illegal)?;
     }
     after.seq = head.seq;
     let claim = held.then(|| Claim { id: job.id, token, job: after.clone() });

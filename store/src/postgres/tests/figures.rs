@@ -43,7 +43,7 @@ fn a_claim_with_many_that_wait() {
 
 /// Time of the processor that a process has used so far, in s.
 fn used(pid: u32) -> f64 {
-    /// What `/proc` counts in, of a second.
+    /// The unit that `/proc` counts in, of a second.
     const PART: f64 = 100.0;
     let Ok(stat) = std::fs::read_to_string(format!("/proc/{pid}/stat")) else { return 0.0 };
     let after_name = stat.rsplit(')').next().unwrap();

@@ -41,7 +41,7 @@ fn the_time_of_a_step_is_the_databases() {
     assert_eq!(store.advance(&claim, Step::Finished).unwrap().changed, Time(2_000_000));
 }
 
-/// One of them comes too late: the others are none the worse for it.
+/// The second of three comes too late: the others are none the worse for it.
 #[test]
 fn rows_that_are_written_together_are_written_each_for_itself() {
     let Some(server) = server() else { return };

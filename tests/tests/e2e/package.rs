@@ -5,6 +5,8 @@ use std::process::Command;
 
 use suture_tests::Place;
 use suture_tests::binary::suture;
+use suture_tests::http::Client;
+use suture_tests::served::Served;
 
 fn packaging() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../packaging")
@@ -137,5 +139,57 @@ fn the_configuration_of_containers_is_taken() {
     let compose = std::fs::read_to_string(packaging().join("compose.yaml")).unwrap();
     for words in ["read_only: true", "- /tmp", "TZ: ", "cap_drop: [ALL]", "no-new-privileges:true", "127.0.0.1:7878:7878"] {
         assert!(compose.contains(words), "{words}");
+    }
+}
+
+/// The values between quotes in a list of one line: `command: ["watch", "--role", "worker"]`.
+fn list_of(line: &str) -> Vec<String> {
+    serde_json::from_str(&line[line.find('[').unwrap()..]).unwrap_or_else(|error| panic!("{line}: {error}"))
+}
+
+/// All that the parts of a farm in containers are told is taken by the program, as far as it can be tried without one: each role is there, and what one names the
+/// other has. What autoscaling asks for is told by a daemon.
+#[test]
+fn the_configuration_of_a_farm_is_taken() {
+    let place = Place::new();
+    let read = |name: &str| std::fs::read_to_string(packaging().join(name)).unwrap();
+    let (compose, config, keda) = (read("farm/compose.yaml"), read("farm/farm.toml"), read("farm/keda.yaml"));
+    place.suture(["config", "check", packaging().join("farm/farm.toml").to_str().unwrap()]).expect(0);
+    let value = |key: &str| {
+        let line = config.lines().find_map(|line| line.strip_prefix(key)?.strip_prefix(" = \"")).unwrap();
+        line.split('"').next().unwrap()
+    };
+    let mut roles = Vec::new();
+    for line in compose
+        .lines()
+        .map(str::trim)
+        .filter(|line| line.starts_with("command: [\"watch\"") || line.starts_with("command: [\"store\""))
+    {
+        let words = list_of(line);
+        let after = |flag: &str| words.iter().position(|word| word == flag).map(|at| words[at + 1].as_str());
+        let helped = place.suture(words.iter().map(String::as_str).chain(["--help"]));
+        assert_eq!(helped.code(), 0, "{words:?}: {}", helped.stderr());
+        match words[0].as_str() {
+            "store" => assert_eq!(after("--store"), Some(value("store"))),
+            _ => assert!(compose.contains(&format!("- ./farm.toml:{}:ro", after("--config").unwrap()))),
+        }
+        roles.extend(after("--role").map(str::to_owned));
+    }
+    assert_eq!(roles, ["intake", "worker", "control"]);
+    assert!(compose.contains(&format!("- ./tokens:{}:ro", value("token_file"))));
+    // The health check asks the daemon where it has its scratch, on a volume of its own.
+    let health = list_of(compose.lines().find(|line| line.contains("\"--ready\"")).unwrap());
+    assert_eq!(health.last().unwrap(), &format!("{}/buckets/{}", value("state"), value("name")));
+    assert!(compose.contains("    - /prints #") && value("state").starts_with("/prints/"));
+    // The object store is the one that the tests run on.
+    let version = compose.lines().find_map(|line| line.trim().strip_prefix("image: docker.io/motoserver/moto:")).unwrap();
+    let installed = std::fs::read_to_string(packaging().join("../.ci/run")).unwrap();
+    assert!(installed.contains(&format!("moto[server]=={version}'")), "{version}");
+    let daemon = Served::start(&place, &["hot", "--listen", "127.0.0.1:0"], "log");
+    let metrics = String::from_utf8(Client::of(&daemon).get("/metrics").expect(200).body).unwrap();
+    let asked: Vec<&str> = keda.split("max(").skip(1).map(|rest| rest.split(')').next().unwrap()).collect();
+    assert_eq!(asked.len(), 3, "{asked:?}");
+    for metric in asked {
+        assert!(metrics.lines().any(|line| line.starts_with(&format!("{metric} "))), "{metric}: {metrics}");
     }
 }

@@ -4,7 +4,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Condvar, Mutex, PoisonError, Weak};
 use std::time::Duration;
 
-use crate::util::cost;
+use crate::util::{cost, parallel};
 
 /// Time between two looks: what is taken for a shorter time may be missed.
 const BETWEEN: Duration = Duration::from_millis(20);
@@ -29,7 +29,7 @@ impl Peak {
         let mut watch = WATCH.lock().unwrap_or_else(PoisonError::into_inner);
         watch.spans.push(Arc::downgrade(&bytes));
         if !watch.is_running {
-            watch.is_running = std::thread::Builder::new().name("memory".into()).spawn(look_on).is_ok();
+            watch.is_running = parallel::servant("memory", look_on).is_some();
         }
         BEGUN.notify_one();
         Self(bytes)

@@ -21,7 +21,6 @@ use crate::store::StoreError;
 
 const READ: &str =
     "SELECT id, seq, record, epoch, token, claim_token, claim_boot, claim_at, suture_now() AS now FROM jobs WHERE id = $1";
-/// $18 is the time that was counted on, if it was.
 /// So often others may be quicker before something must be wrong.
 const ROUNDS: usize = 1000;
 

@@ -408,6 +408,6 @@ pub struct Cost {
     pub triangles_per_second: f64,
     /// Largest resident set of the process, mapped file pages included.
     pub peak_resident_bytes: u64,
-    /// Largest anonymous memory of the process during this work, by a look each 20 ms.
+    /// Largest anonymous memory of the process during this work, by a look each 20 ms and at the end of each stage.
     pub peak_anonymous_bytes: u64,
 }

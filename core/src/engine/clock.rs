@@ -28,6 +28,7 @@ impl Clock {
     pub(crate) fn stage(&mut self, name: &str) {
         let seconds = self.lap.elapsed().as_secs_f64();
         self.lap = Instant::now();
+        self.peak.look();
         tracing::debug!(stage = name, seconds, "Stage done.");
         match self.stages.iter_mut().find(|stage| stage.name == name) {
             Some(stage) => stage.seconds += seconds,

@@ -23,7 +23,7 @@ static BEGUN: Condvar = Condvar::new();
 pub(crate) struct Peak(Arc<AtomicU64>);
 
 impl Peak {
-    /// Begins a span. Takes microseconds, but for the first one, which starts a thread; without that thread, [`Self::bytes`] is what it is asked at.
+    /// Begins a span. Takes microseconds, but for the first one, which starts a thread; without that thread, only [`Self::look`] looks.
     pub(crate) fn begin() -> Self {
         let bytes = Arc::new(AtomicU64::new(0));
         let mut watch = WATCH.lock().unwrap_or_else(PoisonError::into_inner);
@@ -35,10 +35,15 @@ impl Peak {
         Self(bytes)
     }
 
+    /// Looks once more: at the end of a stage, since short ones pass between two looks of the thread. Microseconds.
+    pub(crate) fn look(&self) {
+        self.0.fetch_max(cost::anonymous_bytes(), Ordering::Relaxed);
+    }
+
     /// The largest so far.
     pub(crate) fn bytes(&self) -> u64 {
-        let now = cost::anonymous_bytes();
-        self.0.fetch_max(now, Ordering::Relaxed).max(now)
+        self.look();
+        self.0.load(Ordering::Relaxed)
     }
 }
 

@@ -89,9 +89,14 @@ impl Inner {
         self.clock.now().0
     }
 
+    /// The end of a lease that begins now.
+    fn lease_end(&self) -> u64 {
+        self.now() + if self.flaw == Flaw::Hasty { LEASE / 2 } else { LEASE }
+    }
+
     /// Notes who holds the job after a transition.
     fn note(&self, job: &Job) {
-        let until = self.now() + if self.flaw == Flaw::Hasty { LEASE / 2 } else { LEASE };
+        let until = self.lease_end();
         let mut beside = self.beside();
         match job.hold() {
             Some(hold) => drop(beside.held.insert(job.id, Held { epoch: hold.epoch, token: hold.token, until })),
@@ -204,7 +209,7 @@ impl Seat for InMemorySeat {
         let now = self.inner.now();
         let mut beside = self.inner.beside();
         if let Some(held) = beside.held.get_mut(&claim.id).filter(|held| held.until < now + LEASE - LEASE / 4) {
-            held.until = now + if self.inner.flaw == Flaw::Hasty { LEASE / 2 } else { LEASE };
+            held.until = self.inner.lease_end();
         }
         Ok(lease)
     }

@@ -1,5 +1,6 @@
 //! The sparse edit: which input records leave, turn or change, and what is added. Everything else is untouched.
 
+mod added;
 mod compose;
 #[cfg(test)]
 mod tests;
@@ -16,6 +17,8 @@ use crate::submesh::components::Reversed;
 use crate::submesh::{Origin, Submesh};
 use crate::topology::survey::Survey;
 use crate::util::bits::{self, Shared, next_one, ones};
+use added::Added;
+pub(crate) use added::NewRecords;
 
 /// The change of an input record that is not untouched.
 #[derive(Clone, Debug, PartialEq)]
@@ -42,9 +45,7 @@ pub(crate) struct Edit {
     /// And of regions that go.
     dropped: Vec<u64>,
     /// New records. As many as can take the places of deleted ones, in order; the rest goes to the end of the file.
-    added: Vec<Record>,
-    /// Where each of them comes from.
-    added_from: Vec<FaceOrigin>,
+    added: Added,
     flips: u64,
     deletions: u64,
     max_move: f64,
@@ -91,7 +92,11 @@ impl Edit {
     /// a bit for each of so many `records`. O(records).
     pub(crate) fn over(self, gone: &[u64], turned: &[u64], records: usize) -> Self {
         let stayed = Stayed::of(gone, records);
-        let mut edit = Self { flipped: turned.to_vec(), added: self.added, max_move: self.max_move, ..Self::default() };
+        let added = self.added.from_others(|from| match from {
+            FaceOrigin::Part(t) => FaceOrigin::Part(stayed.record(t)),
+            other => other,
+        });
+        let mut edit = Self { flipped: turned.to_vec(), added, max_move: self.max_move, ..Self::default() };
         let is_left_out = gone.iter().any(|word| *word > 0);
         edit.dropped = if is_left_out || !self.dropped.is_empty() { gone.to_vec() } else { Vec::new() };
         ones(&self.flipped).for_each(|t| edit.flip(stayed.record(t)));
@@ -107,11 +112,6 @@ impl Edit {
                 edit.changes.push((t, change));
             }
         }
-        let of_added = self.added_from.into_iter().map(|from| match from {
-            FaceOrigin::Part(t) => FaceOrigin::Part(stayed.record(t)),
-            other => other,
-        });
-        edit.added_from = of_added.collect();
         edit.flips = bits::count(&edit.flipped);
         edit.deletions = bits::count(&edit.dropped) + edit.changes.iter().filter(|c| c.1 == Change::Delete).count() as u64;
         edit
@@ -123,8 +123,7 @@ impl Edit {
     }
 
     fn add(&mut self, corners: [[f32; 3]; 3], attribute: u16, from: FaceOrigin) {
-        self.added.push(record::encode(corners, attribute));
-        self.added_from.push(from);
+        self.added.push(record::encode(corners, attribute), from);
     }
 
     /// The edit that changes nothing.
@@ -133,8 +132,7 @@ impl Edit {
             changes: Vec::new(),
             flipped: Vec::new(),
             dropped: Vec::new(),
-            added: Vec::new(),
-            added_from: Vec::new(),
+            added: Added::NONE,
             flips: 0,
             deletions: 0,
             max_move: 0.0,
@@ -144,7 +142,7 @@ impl Edit {
 
     /// New records with the faces that they come from, in order.
     pub(crate) fn added_with_origins(&self) -> impl Iterator<Item = (&Record, FaceOrigin)> {
-        self.added.iter().zip(self.added_from.iter().copied())
+        self.added.iter()
     }
 
     /// All records that are new, moved ones included and turned ones not, in no order that matters.
@@ -153,7 +151,7 @@ impl Edit {
             Change::Move(record) => Some(&**record),
             Change::Delete | Change::Flip => None,
         });
-        moved.chain(&self.added)
+        moved.chain(self.added.iter().map(|(record, _)| record))
     }
 
     /// Notes how a living triangle differs from its record, if it does.
@@ -229,7 +227,7 @@ impl Edit {
         mut step: impl FnMut(Step<'r, 'e>) -> Result<(), E>,
     ) -> Result<(), E> {
         let mut changes = self.changes.iter().peekable();
-        let mut added = self.added.iter().zip(&self.added_from);
+        let mut added = self.added.iter().peekable();
         let mut start = 0;
         let mut at = 0;
         // Each is looked for again only once it is passed: every word of bits is read once.
@@ -243,7 +241,7 @@ impl Edit {
             if next > start {
                 step(Step::Untouched(&records[start..next]))?;
             }
-            if next == dropped && next < next_change && added.len() == 0 {
+            if next == dropped && next < next_change && added.peek().is_none() {
                 // They may be nearly all there are.
                 at = bits::next_zero(&self.dropped, next).min(next_change);
                 step(Step::Deleted(next as u32..at as u32))?;
@@ -257,7 +255,7 @@ impl Edit {
                 Some(Change::Flip) => flipped(),
                 Some(Change::Move(record)) => Step::Changed(place, **record, FaceOrigin::Moved(place)),
                 Some(Change::Delete) | None => {
-                    added.next().map_or(Step::Deleted(place..place + 1), |(record, from)| Step::Changed(place, *record, *from))
+                    added.next().map_or(Step::Deleted(place..place + 1), |(record, from)| Step::Changed(place, *record, from))
                 }
             })?;
             at = next + 1;
@@ -272,7 +270,7 @@ impl Edit {
         if start < records.len() {
             step(Step::Untouched(&records[start..]))?;
         }
-        added.try_for_each(|(record, from)| step(Step::Added(record, *from)))
+        added.try_for_each(|(record, from)| step(Step::Added(record, from)))
     }
 
     /// For each record of the output the record of the input that it is, or is a part of; `None` for a new one. O(output).
@@ -327,8 +325,8 @@ impl Edit {
         deleted.sort_unstable();
         deleted.iter().for_each(|t| extend_ranges(&mut all.deleted, *t));
         flips.iter().for_each(|t| extend_ranges(&mut all.flipped, *t));
-        all.added = self.added.iter().map(|r| (record::corners(r), record::attribute(r))).collect();
-        all.added_from.clone_from(&self.added_from);
+        let (added, from) = self.added.iter().map(|(r, from)| ((record::corners(r), record::attribute(r)), from)).unzip();
+        (all.added, all.added_from) = (added, from);
         all
     }
 }

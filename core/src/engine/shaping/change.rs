@@ -3,6 +3,7 @@
 use crate::contract::report::{Features, Residue, Simplified, Smoothed};
 use crate::engine::mesh::Mesh;
 use crate::io::record::{self, Record};
+use crate::output::edit::NewRecords;
 use crate::util::bits;
 
 /// The corners of a triangle.
@@ -12,7 +13,7 @@ type Corners = [[f32; 3]; 3];
 pub(crate) struct Change {
     /// Numbers of triangles, a bit each.
     pub(crate) gone: Vec<u64>,
-    pub(crate) added: Vec<Record>,
+    pub(crate) added: NewRecords,
     pub(crate) told: Told,
 }
 

@@ -24,7 +24,7 @@ pub(super) fn find(mesh: &Mesh, below: &Below) -> Result<Change, String> {
     let removed = defeature::defeature(mesh.vertices(), mesh.faces(), below).map_err(|error| error.to_string())?;
     let told = Told::Features(told(&removed));
     let gone = bits::of(mesh.faces().len(), removed.removed_triangles.into_iter());
-    Ok(Change { gone, added: encoded(removed.added.into_iter()), told })
+    Ok(Change { gone, added: encoded(removed.added.into_iter()).into(), told })
 }
 
 /// Features that were found, for the report.

@@ -8,6 +8,7 @@ use super::corrections::{self, FromFiles, Origins};
 use crate::contract::report::{MOST_LISTED, Outcome, Report, Residue, ResidueRegion, ResidueSuspect};
 use crate::engine::mesh::Mesh;
 use crate::engine::work::Work;
+use crate::output::edit::NewRecords;
 use crate::residue::{self, Corrections, Cuts, FIT_LEAST, Fit, Found, Frame, Kind, Repaired};
 use crate::simplify::{self, Input, Options};
 use crate::smooth;
@@ -57,7 +58,7 @@ fn suspect(mesh: &Mesh, options: &residue::Options<'_>) -> Result<Change, String
         within: suspect.within,
     };
     let suspects = Some(found.iter().take(MOST_LISTED).map(told).collect());
-    Ok(Change { gone: Vec::new(), added: Vec::new(), told: Told::Residue(Residue { suspects, ..Residue::default() }) })
+    Ok(Change { gone: Vec::new(), added: NewRecords::default(), told: Told::Residue(Residue { suspects, ..Residue::default() }) })
 }
 
 /// Puts residue into a report. Where it was looked for without a path, a person has to look at the result.
@@ -118,14 +119,14 @@ fn removed(mesh: &Mesh, options: &residue::Options<'_>, work: Work<'_>) -> Resul
     drop(cuts);
     if let Some(why_not) = misfit(found.fit) {
         let told = Residue { why_not: Some(why_not), path_fit: Some(found.fit.share()), ..Residue::default() };
-        return Ok(Change { gone: Vec::new(), added: Vec::new(), told: Told::Residue(told) });
+        return Ok(Change { gone: Vec::new(), added: NewRecords::default(), told: Told::Residue(told) });
     }
     let mut repaired = residue::repair(view, &found, options).map_err(named)?;
     found.targets = Vec::new();
     let mut told = told(&found, &header);
     told.path_axes = frame.map(|frame| frame.to_string());
     if told.triangles_before == 0 {
-        return Ok(Change { gone: Vec::new(), added: Vec::new(), told: Told::Residue(told) });
+        return Ok(Change { gone: Vec::new(), added: NewRecords::default(), told: Told::Residue(told) });
     }
     let settled = smooth::settle(mesh.vertices(), mesh.faces(), &repaired.points);
     repaired.points = Vec::new();
@@ -137,7 +138,7 @@ fn removed(mesh: &Mesh, options: &residue::Options<'_>, work: Work<'_>) -> Resul
     let proved = fewer.proved.unwrap_or_default();
     told.deviation = proved.forward.max(proved.backward);
     told.triangles_after = (fewer.faces.len() as u64 + told.triangles_before).saturating_sub(mesh.faces().len() as u64);
-    Ok(Change { gone, added, told: Told::Residue(told) })
+    Ok(Change { gone, added: added.into(), told: Told::Residue(told) })
 }
 
 /// The path and its tools: tools of the profile count more than those of the path; a project of CAMotics names both. Text and moves may take `most`

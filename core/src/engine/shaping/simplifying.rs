@@ -52,5 +52,5 @@ pub(super) fn simplify(mesh: &Mesh, work: Work<'_>) -> Result<Change, String> {
         why_not,
     };
     let (gone, added) = replaced(mesh, (&outcome.points, &outcome.faces, &outcome.origins));
-    Ok(Change { gone, added, told: Told::Simplified(told) })
+    Ok(Change { gone, added: added.into(), told: Told::Simplified(told) })
 }

@@ -36,7 +36,7 @@ pub(super) fn smooth(mesh: &Mesh, work: Work<'_>) -> Result<Change, String> {
         why_not: None,
     };
     let (gone, added) = moved(mesh, &settled.points);
-    Ok(Change { gone, added, told: Told::Smoothed(told) })
+    Ok(Change { gone, added: added.into(), told: Told::Smoothed(told) })
 }
 
 /// The mean length of edges, each counted once for each of its triangles; `None` without any. O(faces).

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::convert::Infallible;
 
-use super::{Change, Edit, Step};
+use super::{Change, Edit, NewRecords, Step};
 use crate::contract::report::{FaceOrigin, RepairName};
 use crate::io::record::Record;
 use crate::util::bits;
@@ -11,7 +11,7 @@ use crate::util::bits;
 impl Edit {
     /// This edit of `records`, then one that takes the triangles `gone` of its result away, by their numbers in it, and adds others as the work of
     /// `repair`. O(records).
-    pub(crate) fn then(mut self, records: &[Record], gone: &[u64], added: Vec<Record>, repair: RepairName) -> Self {
+    pub(crate) fn then(mut self, records: &[Record], gone: &[u64], added: NewRecords, repair: RepairName) -> Self {
         let (places, dropped) = self.gone_through(records, gone);
         for (word, gone) in self.flipped.iter_mut().zip(&places) {
             self.flips -= u64::from((*word & gone).count_ones());
@@ -27,24 +27,14 @@ impl Edit {
         } else {
             self.dropped.iter_mut().zip(places).for_each(|(word, gone)| *word |= gone);
         }
-        let stays: Vec<bool> = (0..self.added.len()).map(|k| !dropped.contains(&k)).collect();
-        let mut kept = stays.iter();
-        self.added.retain(|_| kept.next().is_none_or(|stays| *stays));
-        let mut kept = stays.iter();
-        self.added_from.retain(|_| kept.next().is_none_or(|stays| *stays));
-        self.added_from.extend(added.iter().map(|_| FaceOrigin::Repair(repair)));
-        if self.added.is_empty() {
-            // Many may come: they are not moved.
-            self.added = added;
-        } else {
-            self.added.extend(added);
-        }
+        self.added.retain(|place| !dropped.contains(&place));
+        self.added.follow(added, repair);
         self
     }
 
-    /// The new records.
-    pub(crate) fn into_added(self) -> Vec<Record> {
-        self.added
+    /// The new records of the last step.
+    pub(crate) fn into_added(self) -> NewRecords {
+        self.added.into_last()
     }
 
     /// Where the triangles `gone` of the result come from: records of the input, and new ones by their places among those that are added.

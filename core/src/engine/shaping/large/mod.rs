@@ -22,6 +22,7 @@ use crate::engine::nameless_stl::Spooled;
 use crate::engine::work::Work;
 use crate::geometry::sums::Bounds;
 use crate::io::record::{self, Record};
+use crate::output::edit::NewRecords;
 use crate::simplify::{Ended, MOST_DEVIATION};
 use crate::util::{bits, parallel};
 use pass::{BLOCK, Pass, Passed, Stop};
@@ -183,7 +184,7 @@ impl<'a> Course<'a> {
     }
 
     /// The triangles that go and come.
-    fn change(self) -> Change {
+    fn change(mut self) -> Change {
         let after = self.current().len();
         let within = Some(self.work.profile.simplify_within_mm).filter(|within| *within > 0.0);
         let why_not = self.wanted.filter(|wanted| after > *wanted).map(|wanted| simplifying::why_not(wanted, self.ended, within));
@@ -195,8 +196,9 @@ impl<'a> Course<'a> {
             volume_change: self.volume,
             why_not,
         };
-        let added = self.spool.as_ref().map(|spool| spool.0.records()).and_then(|all| all.get(..after - self.survivors));
-        let added = added.unwrap_or_default().to_vec();
+        // As many as memory may not hold: they stay where they are.
+        let count = after - self.survivors;
+        let added = self.spool.take().map(|(mesh, spool)| NewRecords::File { mesh, _spool: spool, count }).unwrap_or_default();
         let mut gone = bits::all(self.records.len());
         gone.iter_mut().zip(&self.stays).for_each(|(gone, stays)| *gone &= !stays);
         Change { gone, added, told: Told::Simplified(told) }

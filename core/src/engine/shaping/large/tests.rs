@@ -40,7 +40,7 @@ fn run(records: &[Record], sizes: &Sizes, profile: &Profile, limits: &Limits) ->
 /// The triangles after a change.
 fn after(records: &[Record], change: &Change) -> Vec<Record> {
     let stays = (0..).zip(records).filter(|(at, _)| !bits::holds(&change.gone, *at)).map(|(_, record)| record);
-    stays.chain(&change.added).copied().collect()
+    stays.chain(change.added.iter()).copied().collect()
 }
 
 fn triangles(records: &[Record]) -> Vec<Triangle> {

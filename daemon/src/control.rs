@@ -410,7 +410,7 @@ pub(crate) fn ask<W: Wish>(root: &Path, wish: &W) -> io::Result<Option<Result<W:
 mod tests {
     use super::*;
     use suture_store::testkit::{dropped, result_of};
-    use suture_store::{Ending, Filter, MemoryStore, RelPath, Source, Step, Submission, SystemClock};
+    use suture_store::{Ending, Filter, MemoryStore, RelPath, Seen, Source, Step, Submission, SystemClock};
 
     #[test]
     fn wishes_are_answered_or_refused_with_a_code() {
@@ -424,7 +424,7 @@ mod tests {
             mtime_ns: 4,
             profile: "default".into(),
         };
-        store.submit(&[Submission { source, foreign: None, priority: Priority::default() }]).unwrap();
+        store.submit(&[Submission { source, foreign: None, priority: Priority::default(), seen: Seen::Now }]).unwrap();
         let id = JobId(1);
         assert!(answer(&store, &JobsWish::List).is_ok_and(|jobs| jobs.len() == 1 && jobs[0].id == id));
         let refused = |wish| answer(&store, &wish).is_err_and(|refusal| refusal.exit_code == 2);

@@ -189,7 +189,7 @@ fn write_mark(path: &Path, seq: Seq) -> io::Result<()> {
 
 #[cfg(test)]
 mod tests {
-    use suture_store::{Control, Filter, MemoryStore, Priority, Source, Step, Submission, SystemClock};
+    use suture_store::{Control, Filter, MemoryStore, Priority, Seen, Source, Step, Submission, SystemClock};
 
     use super::*;
     use crate::config::{Config, FolderConfig};
@@ -203,7 +203,8 @@ mod tests {
         let path = RelPath::new(path).unwrap();
         let (folder, profile, ino) = ("hot".into(), "default".into(), path.as_bytes().len() as u64);
         let source = Source { folder, path: path.clone(), dev: 1, ino, size: 84, mtime_ns: 1, profile };
-        let id = store.submit(&[Submission { source, foreign: None, priority: Priority::default() }]).unwrap()[0].id;
+        let id =
+            store.submit(&[Submission { source, foreign: None, priority: Priority::default(), seen: Seen::Now }]).unwrap()[0].id;
         (path, id)
     }
 

@@ -155,7 +155,7 @@ mod tests {
     use std::os::unix::fs::MetadataExt;
 
     use suture_core::report::Outcome;
-    use suture_store::{Ending, Filter, MemoryStore, Priority, Publication, RelPath, Source, Step, Submission};
+    use suture_store::{Ending, Filter, MemoryStore, Priority, Publication, RelPath, Seen, Source, Step, Submission};
 
     use super::*;
     use crate::config::FolderConfig;
@@ -199,7 +199,7 @@ mod tests {
                 mtime_ns: 3,
                 profile: "default".into(),
             };
-            store.submit(&[Submission { source, foreign: None, priority: Priority::default() }]).unwrap();
+            store.submit(&[Submission { source, foreign: None, priority: Priority::default(), seen: Seen::Now }]).unwrap();
             let claim = store.claim(&Filter::default()).unwrap().unwrap();
             let publication = Publication {
                 ending,

@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 
-use suture_store::{JobId, Priority, RelPath, Source, Submission, Submitted};
+use suture_store::{JobId, Priority, RelPath, Seen, Source, Submission, Submitted};
 
 use crate::choice;
 use crate::claim::Original;
@@ -184,7 +184,7 @@ impl Reconciler {
                     let source = self.source(name, &identity);
                     let own = || choice::priority(&self.settings.now(), &self.folder, &source.path, &source.profile);
                     let priority = companion.unwrap_or_else(own);
-                    submissions.push((path, Submission { source, foreign, priority }));
+                    submissions.push((path, Submission { source, foreign, priority, seen: Seen::Now }));
                 }
                 Err(error) => self.give_up(&path, identity, &error.to_string()),
             }
@@ -359,7 +359,7 @@ impl Reconciler {
         };
         let source = self.source(handed.path.clone(), &identity);
         let priority = choice::priority(&self.settings.now(), &self.folder, &source.path, &source.profile);
-        Ok(Submission { source, foreign: None, priority })
+        Ok(Submission { source, foreign: None, priority, seen: Seen::Now })
     }
 
     /// Does this very file lie where it was dropped?

@@ -42,7 +42,7 @@ fn submit(
     };
     if handed.placed.is_some() {
         if let Some(id) = context.store.find(&submission.source)? {
-            return Ok(Ok(Submitted { id, new: false }));
+            return Ok(Ok(Submitted { id, new: false, ended: false }));
         }
         match reconciler.is_there(&submission.source) {
             Ok(true) => {}

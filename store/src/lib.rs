@@ -50,6 +50,6 @@ pub use role::{NoRole, Role, Roles};
 pub use share::{NoWeight, Share, Shares, Weight};
 pub use sled_store::{Opening, SledStore, StateLock, Verified};
 pub use store::{
-    Claim, Control, Filter, JobStore, Lease, Look, Page, Query, Recovered, StoreError, Submission, Submitted, Waiting,
+    Claim, Control, Filter, JobStore, Lease, Look, Page, Query, Recovered, Seen, StoreError, Submission, Submitted, Waiting,
 };
 pub use transfer::Transfer;

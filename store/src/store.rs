@@ -250,6 +250,25 @@ pub struct Submission {
     pub foreign: Option<String>,
     /// How soon it is wanted.
     pub priority: Priority,
+    /// When it was looked at.
+    pub seen: Seen,
+}
+
+/// When a drop was looked at, as far as others may have moved it since.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Seen {
+    /// No one moves it before it is submitted.
+    #[default]
+    Now,
+    /// After the job of that number had ended, of the very same file; without one, at any time.
+    After(Option<JobId>),
+}
+
+impl Submission {
+    /// May `latest`, the last job of the very same file, have moved it since it was looked at?
+    pub(crate) fn may_be_gone(&self, latest: &Job) -> bool {
+        !latest.answers_for_source() && matches!(self.seen, Seen::After(last) if last < Some(latest.id))
+    }
 }
 
 /// What became of a submission.
@@ -259,6 +278,9 @@ pub struct Submitted {
     pub id: JobId,
     /// `false`: the job was there already, and not only noticed.
     pub new: bool,
+    /// The job has ended, and may have moved the file since it was looked at ([`Seen`]): nothing was done. Whoever finds the file there still submits it
+    /// again.
+    pub ended: bool,
 }
 
 /// Which jobs to claim.

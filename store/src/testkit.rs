@@ -29,9 +29,10 @@ type Check = fn(&mut dyn Subject, &ManualClock) -> Result<(), StoreError>;
 /// # Panics
 /// When the store does not do what [`JobStore`] promises.
 pub fn conformance(make: &dyn Fn(Arc<dyn Clock>) -> Box<dyn Subject>) {
-    let checks: [(&str, Check); 31] = [
+    let checks: [(&str, Check); 32] = [
         ("submission is idempotent", claims::submission_is_idempotent),
         ("a file that came back is new", claims::a_file_that_came_back_is_new),
+        ("a file that may be gone is looked at again", claims::a_file_that_may_be_gone_is_looked_at_again),
         ("what was only noticed may be wanted later", claims::what_was_only_noticed_may_be_wanted_later),
         ("the oldest that fits is claimed", claims::the_oldest_that_fits_is_claimed),
         ("the more urgent goes first", claims::the_more_urgent_goes_first),

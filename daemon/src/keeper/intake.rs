@@ -7,7 +7,7 @@ use std::sync::PoisonError;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
-use suture_store::{RelPath, Role, Source, StoreError, Submission, crash_point};
+use suture_store::{RelPath, Role, Seen, Source, StoreError, Submission, Submitted, crash_point};
 
 use super::news::Told;
 use crate::attempt::Context;
@@ -155,7 +155,7 @@ impl Intake<'_> {
         let (folder, (dev, ino)) = (self.folder.name.clone(), object.version.numbers());
         let (size, mtime_ns) = (object.version.size, object.version.mtime_ns);
         let source = Source { folder, path, dev, ino, size, mtime_ns, profile };
-        Ok(Looked::Drop(Submission { source, foreign: None, priority }))
+        Ok(Looked::Drop(Submission { source, foreign: None, priority, seen: Seen::After(None) }))
     }
 
     fn submit(&self, found: &[Submission]) -> Result<(), NoAnswer> {
@@ -168,10 +168,21 @@ impl Intake<'_> {
                 return found.iter().try_for_each(|one| self.submit(std::slice::from_ref(one)));
             }
             Err(error) if error.is_callers() => tracing::warn!(%error, "A drop cannot become a job."),
-            submitted => drop(submitted?),
+            submitted => self.look_again(found, &submitted?)?,
         }
         crash_point("daemon.submitted");
         self.context.schedule.news();
+        Ok(())
+    }
+
+    /// Of a drop that a worker moved while it was looked at no second job is made: it is new only if it is still there.
+    fn look_again(&self, found: &[Submission], answers: &[Submitted]) -> Result<(), NoAnswer> {
+        for (before, answer) in found.iter().zip(answers).filter(|(_, answer)| answer.ended) {
+            let key = String::from_utf8_lossy(before.source.path.as_bytes());
+            if let Looked::Drop(again) = self.drop_of(&key)? {
+                self.submit(&[Submission { seen: Seen::After(Some(answer.id)), ..again }])?;
+            }
+        }
         Ok(())
     }
 

@@ -4,7 +4,7 @@ use std::cell::Cell;
 use std::sync::Arc;
 
 use object_store::memory::InMemory;
-use suture_store::{Claim, Filter, JobStore, Kind, MemoryStore, Priority, RelPath, Source, Submission, SystemClock, Time};
+use suture_store::{Claim, Filter, JobStore, Kind, MemoryStore, Priority, RelPath, Seen, Source, Submission, SystemClock, Time};
 
 use super::*;
 use crate::bucket::Bucket;
@@ -37,7 +37,7 @@ impl Bench {
         let (folder, path, profile) = ("hot".into(), RelPath::new("part.stl").unwrap(), "default".into());
         let source = Source { folder, path, dev, ino, size: ORIGINAL.len() as u64, mtime_ns: drop.mtime_ns, profile };
         let store = MemoryStore::new(Arc::new(SystemClock));
-        store.submit(&[Submission { source, foreign: None, priority: Priority::default() }]).unwrap();
+        store.submit(&[Submission { source, foreign: None, priority: Priority::default(), seen: Seen::Now }]).unwrap();
         let config = FolderConfig { name: "hot".into(), ..FolderConfig::of(&dir.path().join("scratch")) };
         std::fs::create_dir(&config.path).unwrap();
         let folder = Folder::open(&config, None).unwrap();

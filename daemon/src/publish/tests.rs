@@ -4,7 +4,7 @@ use super::*;
 use crate::config::FolderConfig;
 use crate::config::taken::OnTaken;
 use std::sync::Arc;
-use suture_store::{Filter, MemoryStore, Priority, RelPath, Source, Submission, SystemClock};
+use suture_store::{Filter, MemoryStore, Priority, RelPath, Seen, Source, Submission, SystemClock};
 
 /// A hot folder with one dropped file, claimed in the store.
 pub(crate) struct Scene {
@@ -60,7 +60,7 @@ impl Scene {
             profile: "default".into(),
         };
         let store = MemoryStore::new(Arc::new(SystemClock));
-        store.submit(&[Submission { source, foreign: None, priority: Priority::default() }]).unwrap();
+        store.submit(&[Submission { source, foreign: None, priority: Priority::default(), seen: Seen::Now }]).unwrap();
         let claim = store.claim(&Filter::default()).unwrap().unwrap();
         Self { _dir: dir, folder, store, claim, committed: Cell::new(false) }
     }

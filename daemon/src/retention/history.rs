@@ -88,7 +88,7 @@ mod tests {
     use std::sync::atomic::{AtomicU64, Ordering};
     use std::time::Duration;
 
-    use suture_store::{Boot, Clock, Control, MemoryStore, Priority, RelPath, Source, Submission};
+    use suture_store::{Boot, Clock, Control, MemoryStore, Priority, RelPath, Seen, Source, Submission};
 
     use super::*;
 
@@ -119,7 +119,7 @@ mod tests {
             let path = RelPath::new(format!("{day}.stl")).unwrap();
             let (folder, profile) = ("hot".into(), "default".into());
             let source = Source { folder, path, dev: 1, ino: day, size: 84, mtime_ns: 5, profile };
-            store.submit(&[Submission { source, foreign: None, priority: Priority::default() }]).unwrap();
+            store.submit(&[Submission { source, foreign: None, priority: Priority::default(), seen: Seen::Now }]).unwrap();
             if day < 10 {
                 store.control(JobId(day), Control::Cancel).unwrap();
             }

@@ -267,7 +267,7 @@ fn tell(folder: &Folder, going: &Going, to: Option<&Path>, swept: &mut Swept) {
 
 #[cfg(test)]
 mod tests {
-    use suture_store::{Clock, MemoryStore, Priority, RelPath, Source, Submission, SystemClock};
+    use suture_store::{Clock, MemoryStore, Priority, RelPath, Seen, Source, Submission, SystemClock};
 
     use super::*;
     use crate::config::keep::Bound;
@@ -403,7 +403,11 @@ mod tests {
         for n in 1..=12 {
             let (path, folder, profile) = (RelPath::new(format!("{n}.stl")).unwrap(), "hot".into(), "default".into());
             let source = Source { folder, path, dev: 1, ino: n, size: 84, mtime_ns: 1, profile };
-            let id = scene.store.submit(&[Submission { source, foreign: None, priority: Priority::default() }]).unwrap()[0].id;
+            let id = scene
+                .store
+                .submit(&[Submission { source, foreign: None, priority: Priority::default(), seen: Seen::Now }])
+                .unwrap()[0]
+                .id;
             scene.store.control(id, suture_store::Control::Cancel).unwrap();
             // One more than a tenth too many, and it is back at its bound.
             assert_eq!(sweeper.count(Time(0)).unwrap(), if n == 12 { 2 } else { 0 });
@@ -418,7 +422,11 @@ mod tests {
         let job = |name: &str, ino| {
             let (path, folder, profile) = (RelPath::new(name).unwrap(), "hot".into(), "default".into());
             let source = Source { folder, path, dev: found.dev + 1, ino, size: found.size, mtime_ns: found.mtime_ns, profile };
-            let id = scene.store.submit(&[Submission { source, foreign: None, priority: Priority::default() }]).unwrap()[0].id;
+            let id = scene
+                .store
+                .submit(&[Submission { source, foreign: None, priority: Priority::default(), seen: Seen::Now }])
+                .unwrap()[0]
+                .id;
             scene.store.control(id, suture_store::Control::Cancel).unwrap();
             id
         };

@@ -19,7 +19,7 @@ fn settle(r: &mut Reconciler, start: Instant) -> Vec<(PathBuf, Submission)> {
 }
 
 fn new(id: u64) -> Submitted {
-    Submitted { id: JobId(id), new: true }
+    Submitted { id: JobId(id), new: true, ended: false }
 }
 
 fn mesh(path: &Path) {

@@ -45,10 +45,15 @@ async fn try_submit(transaction: &mut PgTransaction<'_>, found: &[Submission]) -
     let (mut answers, mut new, mut given) = (Vec::with_capacity(found.len()), Vec::new(), BTreeMap::new());
     for (submission, key) in found.iter().zip(keys) {
         if let Some(id) = given.get(&key).copied() {
-            answers.push(Submitted { id, new: false });
+            answers.push(Submitted { id, new: false, ended: false });
             continue;
         }
-        let job = known.get(&key).filter(|stored| stored.job.answers_for_source());
+        let latest = known.get(&key);
+        if let Some(ended) = latest.filter(|stored| submission.may_be_gone(&stored.job)) {
+            answers.push(Submitted { id: ended.job.id, new: false, ended: true });
+            continue;
+        }
+        let job = latest.filter(|stored| stored.job.answers_for_source());
         let id = match (job, &submission.foreign) {
             // Only noticed until now, and wanted since.
             (Some(noticed), None) if noticed.job.kind() == Kind::Noticed => {
@@ -61,7 +66,7 @@ async fn try_submit(transaction: &mut PgTransaction<'_>, found: &[Submission]) -
                 id
             }
             (Some(stored), _) => {
-                answers.push(Submitted { id: stored.job.id, new: false });
+                answers.push(Submitted { id: stored.job.id, new: false, ended: false });
                 continue;
             }
             (None, _) => {
@@ -71,7 +76,7 @@ async fn try_submit(transaction: &mut PgTransaction<'_>, found: &[Submission]) -
             }
         };
         given.insert(key, id);
-        answers.push(Submitted { id, new: true });
+        answers.push(Submitted { id, new: true, ended: false });
     }
     insert(transaction, &new, true, last).await?;
     if new.iter().any(|job| job.kind() != Kind::Noticed) {

@@ -39,10 +39,15 @@ impl<T: Tables> Queue<T> {
         for submission in found {
             let file = Identity::from(&submission.source);
             if let Some(id) = keys.get(&file).copied() {
-                answers.push(Submitted { id, new: false });
+                answers.push(Submitted { id, new: false, ended: false });
                 continue;
             }
-            let known = self.latest_of(&inner, &file)?.filter(Job::answers_for_source);
+            let latest = self.latest_of(&inner, &file)?;
+            if let Some(ended) = latest.as_ref().filter(|job| submission.may_be_gone(job)) {
+                answers.push(Submitted { id: ended.id, new: false, ended: true });
+                continue;
+            }
+            let known = latest.filter(Job::answers_for_source);
             let (before, mut job) = match (known, &submission.foreign) {
                 // Only noticed until now, and wanted since.
                 (Some(noticed), None) if noticed.kind() == Kind::Noticed => {
@@ -51,7 +56,7 @@ impl<T: Tables> Queue<T> {
                     (Some(noticed), job)
                 }
                 (Some(known), _) => {
-                    answers.push(Submitted { id: known.id, new: false });
+                    answers.push(Submitted { id: known.id, new: false, ended: false });
                     continue;
                 }
                 (None, _) => {
@@ -62,7 +67,7 @@ impl<T: Tables> Queue<T> {
             head.seq.0 += 1;
             job.seq = head.seq;
             keys.insert(file, job.id);
-            answers.push(Submitted { id: job.id, new: true });
+            answers.push(Submitted { id: job.id, new: true, ended: false });
             jobs.push((before, job));
         }
         if jobs.is_empty() {

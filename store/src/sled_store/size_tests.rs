@@ -6,6 +6,7 @@ use super::*;
 use crate::id::Hash;
 use crate::job::{Ending, Priority, Publication};
 use crate::path::RelPath;
+use crate::store::Seen;
 
 /// The store is to stay below 64 MiB with 20,000 jobs that have ended. Here sled has no time to clean up.
 const MOST_FOR_A_JOB: u64 = 3200;
@@ -32,7 +33,7 @@ fn drop_one(number: u64) -> Submission {
         mtime_ns: 1_700_000_000_123_456_789 + i64::try_from(number).unwrap() * 1_000_003,
         profile: "default".into(),
     };
-    Submission { source, foreign: None, priority: Priority::default() }
+    Submission { source, foreign: None, priority: Priority::default(), seen: Seen::Now }
 }
 
 /// All that waits is repaired.

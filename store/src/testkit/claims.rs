@@ -6,7 +6,7 @@ use crate::job::{
     Step, Withdrawal,
 };
 use crate::path::RelPath;
-use crate::store::{Control, Filter, JobStore, Lease, Query, StoreError, Submission};
+use crate::store::{Control, Filter, JobStore, Lease, Query, Seen, StoreError, Submission};
 
 use super::tools::{ManualClock, Subject, claim_any, finish, job, named, no_one_is_innocent, result_of, submit_one};
 
@@ -56,6 +56,26 @@ pub(super) fn a_file_that_came_back_is_new(subject: &mut dyn Subject, _: &Manual
     Ok(())
 }
 
+/// Whoever looks at a drop while it is moved learns that its job has ended, and makes no second one of it.
+pub(super) fn a_file_that_may_be_gone_is_looked_at_again(subject: &mut dyn Subject, _: &ManualClock) -> Result<(), StoreError> {
+    let store = subject.store();
+    let seen =
+        |after: Option<u64>| Ok::<_, StoreError>([Submission { seen: Seen::After(after.map(JobId)), ..named("a.stl", 84)? }]);
+    let answer = |after| Ok::<_, StoreError>(store.submit(&seen(after)?)?.first().map(|told| (told.id.0, told.new, told.ended)));
+    assert_eq!(answer(None)?, Some((1, true, false)));
+    assert_eq!(answer(None)?, Some((1, false, false)), "it waits");
+    finish(store, &claim_any(store)?, Ending::Clean, true)?;
+    assert_eq!(answer(None)?, Some((1, false, true)));
+    assert_eq!(store.claim(&Filter::default())?, None, "no second job was made");
+    assert_eq!(answer(Some(1))?, Some((2, true, false)), "it was there after that end: the same file was dropped again");
+    store.advance(&claim_any(store)?, Step::Withdrawn(Withdrawal::Vanished))?;
+    assert_eq!(answer(Some(1))?, Some((2, false, true)));
+    assert_eq!(answer(Some(2))?, Some((3, true, false)));
+    finish(store, &claim_any(store)?, Ending::Clean, false)?;
+    assert_eq!(answer(None)?, Some((3, false, false)), "its original stays, and it answers for it");
+    Ok(())
+}
+
 /// A mesh that names it may come later: then the same job is queued, once, as urgent as the mesh. What an operator took back stays back.
 pub(super) fn what_was_only_noticed_may_be_wanted_later(subject: &mut dyn Subject, _: &ManualClock) -> Result<(), StoreError> {
     let store = subject.store();
@@ -77,7 +97,7 @@ pub(super) fn what_was_only_noticed_may_be_wanted_later(subject: &mut dyn Subjec
         store
             .submit(&[foreign("a.mtl")?, wanted("a.mtl")?])?
             .iter()
-            .all(|answer| *answer == crate::store::Submitted { id: JobId(1), new: false })
+            .all(|answer| *answer == crate::store::Submitted { id: JobId(1), new: false, ended: false })
     );
     let claim = claim_any(store)?;
     assert_eq!((claim.id, claim.job.priority), (JobId(1), Priority::HIGHEST));

@@ -51,17 +51,28 @@ impl Server {
     /// # Panics
     /// When it does not start, and where there is none in CI.
     pub fn start() -> Option<Self> {
+        Self::start_in(&std::env::temp_dir(), &[])
+    }
+
+    /// The same, its files in a folder of this one; `init` are more options for `initdb`.
+    ///
+    /// # Panics
+    /// As [`Server::start`].
+    pub fn start_in(folder: &Path, init: &[&str]) -> Option<Self> {
         let Some(bin) = programs() else {
             assert!(std::env::var_os("CI").is_none(), "CI has no PostgreSQL");
             eprintln!("skipped: there is no PostgreSQL on this machine");
             return None;
         };
-        let dir = tempfile::Builder::new().prefix("suture-pg").tempdir().expect("a temporary folder");
+        let dir = tempfile::Builder::new().prefix("suture-pg").tempdir_in(folder).expect("a temporary folder");
         own(dir.path());
         let data = dir.path().join("data");
-        let mut init = as_user(&bin.join("initdb"), dir.path());
-        init.arg("-D").arg(&data).args(["--auth=trust", "--username=owner", "--no-sync", "--encoding=UTF8", "--locale=C"]);
-        assert!(init.stdout(Stdio::null()).status().expect("it can be started").success(), "initdb");
+        let mut make = as_user(&bin.join("initdb"), dir.path());
+        make.arg("-D")
+            .arg(&data)
+            .args(["--auth=trust", "--username=owner", "--no-sync", "--encoding=UTF8", "--locale=C"])
+            .args(init);
+        assert!(make.stdout(Stdio::null()).status().expect("it can be started").success(), "initdb");
         let script = "read -r _; \"$1\" -D \"$2\" -m immediate stop; rm -rf \"$3\"";
         let mut cleaner = as_user(Path::new("sh"), dir.path());
         cleaner.args(["-c", script, "sh"]).arg(bin.join("pg_ctl")).arg(&data).arg(dir.path());
@@ -116,6 +127,16 @@ impl Server {
     /// When it does not end.
     pub fn kill(&self) {
         assert!(self.control().args(["-m", "immediate", "stop"]).status().expect("it can be started").success());
+    }
+
+    /// Starts it anew, whether it runs or has failed.
+    ///
+    /// # Panics
+    /// When it does not start.
+    pub fn run_anew(&self) {
+        // There may be none to stop.
+        _ = self.control().args(["-m", "immediate", "stop"]).status();
+        self.run();
     }
 
     /// Where its socket is.

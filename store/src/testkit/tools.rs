@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use crate::id::{Boot, Clock, Hash, JobId, Time};
 use crate::job::{Ending, Job, Priority, Publication, Source, Step, Testimony};
 use crate::path::{PathError, RelPath};
-use crate::store::{Claim, Filter, JobStore, StoreError, Submission};
+use crate::store::{Claim, Filter, JobStore, Seen, StoreError, Submission};
 
 /// A clock that stands still until it is set.
 #[derive(Debug)]
@@ -74,7 +74,7 @@ pub fn dropped(name: &str, size: u64) -> Result<Submission, PathError> {
         mtime_ns: 1_700_000_000_000_000_000,
         profile: "default".into(),
     };
-    Ok(Submission { source, foreign: None, priority: Priority::default() })
+    Ok(Submission { source, foreign: None, priority: Priority::default(), seen: Seen::Now })
 }
 
 /// A result of `ending` under the names of the source.

@@ -46,8 +46,16 @@ fn catch(options: &[&str], crash_points: bool) -> (tempfile::TempDir, PathBuf) {
 /// When nothing has changed, that takes a fraction of a second.
 fn build(options: &[&str]) -> PathBuf {
     let (target, profile) = target_and_profile();
-    let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
-    let output = Command::new(cargo)
+    let mut command = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
+    // What cargo tells this test program of its package would have dependencies compiled anew whose build scripts read it.
+    let is_of_package =
+        |name: &str| ["CARGO_PKG_", "CARGO_MANIFEST_", "CARGO_PRIMARY_"].iter().any(|told| name.starts_with(told));
+    for (name, _) in std::env::vars_os() {
+        if name.to_str().is_some_and(is_of_package) {
+            command.env_remove(name);
+        }
+    }
+    let output = command
         .args(["build", "--quiet", "--package", "suture", "--bin", "suture", "--message-format", "json-render-diagnostics"])
         .arg("--target-dir")
         .arg(target)

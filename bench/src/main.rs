@@ -137,6 +137,17 @@ enum Task {
     Machined(machined::Options),
     /// Measure how fast suture and its peers make triangles fewer, and how near the rest is, and publish it.
     Simplify(SimplifyChoices),
+    /// Measure how fast files go through the daemon with jobs in its own store and in PostgreSQL, and publish it.
+    Stores {
+        /// Triangles of a file, and how many files.
+        #[arg(long, value_name = "TRIANGLES:FILES", value_delimiter = ',', default_value = "5000:400,200000:24", value_parser = name_and_size::<u64>)]
+        sizes: Vec<(u64, u64)>,
+        /// Runs with each store, in alternation.
+        #[arg(long, default_value_t = 5)]
+        runs: usize,
+        #[command(flatten)]
+        options: Closing,
+    },
     /// Load one OBJ by tobj, and print the seconds as JSON: a process that `formats` measures.
     #[command(hide = true)]
     LoadObj { file: PathBuf },
@@ -301,6 +312,9 @@ fn main() -> ExitCode {
         }
         Task::Machined(options) => machined::machined(&options).map(|()| ExitCode::SUCCESS),
         Task::Simplify(choices) => choices.measure(),
+        Task::Stores { sizes, runs, options } => {
+            closing(options, "stores", false, |options| compare::stores::stores(options, &sizes, runs))
+        }
         Task::LoadObj { file } => load_obj(&file),
         Task::Publish(Publish { results, check: true }) => check(results.as_deref()),
         Task::Publish(choices) => publish(choices.results.as_deref()).map(|()| ExitCode::SUCCESS),

@@ -12,6 +12,7 @@ use super::record::{Input, Line, Outcome, Run, Session, read};
 use super::sides::Side;
 use super::simplified::Simplified;
 use super::statistics::Spread;
+use super::stored::Stored;
 use super::transfer::Transfer;
 use super::way::Way;
 
@@ -64,6 +65,10 @@ impl Chapter {
 
     pub(super) fn simplified(&self) -> impl Iterator<Item = &Simplified> {
         self.lines.iter().filter_map(|line| if let Line::Simplified(made) = line { Some(&**made) } else { None })
+    }
+
+    pub(super) fn stored(&self) -> impl Iterator<Item = &Stored> {
+        self.lines.iter().filter_map(|line| if let Line::Stored(stored) = line { Some(&**stored) } else { None })
     }
 
     pub(super) fn transfers(&self) -> impl Iterator<Item = &Transfer> {

@@ -15,6 +15,7 @@ use super::page_outlines;
 use super::page_simplify;
 use super::page_skin;
 use super::page_solids;
+use super::page_stores;
 use super::record::{Input, Judged, is_good};
 use super::sides::{LICENCES, Side};
 use super::statistics::{Spread, number, short as short_number, spaced};
@@ -56,6 +57,7 @@ pub(super) fn page(book: &Book, plots: &[(String, String)]) -> String {
     page += &page_formats::formats(book);
     page += &page_outlines::outlines(book);
     page += &page_simplify::simplify(book);
+    page += &page_stores::stores(book);
     for input in book.inputs() {
         page += &of_input(book, input);
     }

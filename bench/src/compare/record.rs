@@ -17,6 +17,7 @@ use super::made::{Closed, Shaped, Skinned, Solved, Understood};
 use super::sides::Side;
 use super::simplified::Simplified;
 use super::statistics::spaced;
+use super::stored::Stored;
 use super::transfer::Transfer;
 use super::way::Way;
 
@@ -37,6 +38,7 @@ pub(crate) enum Line {
     Transfer(Transfer),
     Filled(Box<Filled>),
     Simplified(Box<Simplified>),
+    Stored(Box<Stored>),
     /// Something was left out, and why.
     Skipped {
         side: Side,

@@ -13,12 +13,15 @@ pub mod moto;
 pub mod openapi;
 pub mod oracle;
 pub mod place;
+pub mod proxy;
 pub mod receiver;
 pub mod scene;
 pub mod served;
 pub mod stl;
 #[cfg(all(target_os = "linux", target_arch = "x86_64"))]
 pub mod trace;
+#[cfg(target_os = "linux")]
+pub mod wire;
 pub mod zip;
 
 pub use place::{Place, Ran};

@@ -90,6 +90,14 @@ impl<'a> Served<'a> {
         kill_process(Pid::from_child(&self.child), signal).expect("the daemon lives");
     }
 
+    /// How it ended; `None`: it runs.
+    ///
+    /// # Panics
+    /// When it cannot be asked.
+    pub fn end(&mut self) -> Option<ExitStatus> {
+        self.child.try_wait().expect("a child can be asked")
+    }
+
     /// Waits for its end.
     ///
     /// # Panics

@@ -15,6 +15,10 @@ mod copier;
 mod cuts;
 #[path = "trouble/ending.rs"]
 mod ending;
+#[path = "trouble/farm.rs"]
+mod farm;
+#[path = "trouble/farm_members.rs"]
+mod farm_members;
 #[path = "trouble/mounts.rs"]
 mod mounts;
 #[path = "trouble/moved.rs"]

@@ -1,72 +1,19 @@
 //! A hot folder in a bucket, on a server that speaks S3, behind a proxy that fails.
 
-use std::io::{Read, Write};
-use std::net::{TcpListener, TcpStream};
 use std::os::unix::process::ExitStatusExt;
 use std::process::Command;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicU8, AtomicUsize, Ordering};
 
 use suture_bench::generate::Case;
 use suture_tests::Place;
 use suture_tests::binary::with_crash_points;
 use suture_tests::hot::{doubtful, holes};
 use suture_tests::moto::{Store, on};
+use suture_tests::proxy::{Mood, Proxy};
 use suture_tests::served::{Served, wait_until};
 
-/// How a proxy before the store behaves.
-const HONEST: u8 = 0;
-/// Of four answers one is an error, and of eight one is cut.
-const FAILING: u8 = 1;
-/// Nothing is allowed any more.
-const REFUSING: u8 = 2;
-/// Nothing is answered.
-const DEAD: u8 = 3;
-
-/// A proxy before the store. Its port.
-fn proxy(port: u16, mood: &Arc<AtomicU8>) -> u16 {
-    let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
-    let own = listener.local_addr().expect("an address").port();
-    let (count, mood) = (AtomicUsize::new(0), Arc::clone(mood));
-    std::thread::spawn(move || {
-        for near in listener.incoming().flatten() {
-            let (n, mood) = (count.fetch_add(1, Ordering::Relaxed), mood.load(Ordering::SeqCst));
-            std::thread::spawn(move || relay(near, port, n, mood));
-        }
-    });
-    own
-}
-
-/// The server ends each connection with its answer, so that one connection is one call.
-fn relay(mut near: TcpStream, port: u16, n: usize, mood: u8) {
-    if mood == DEAD {
-        return;
-    }
-    let Ok(mut far) = TcpStream::connect(("127.0.0.1", port)) else { return };
-    let (Ok(mut from), Ok(mut to)) = (near.try_clone(), far.try_clone()) else { return };
-    if mood == HONEST || mood == FAILING {
-        std::thread::spawn(move || std::io::copy(&mut from, &mut to));
-    } else {
-        // The head of the request is read, or the answer would be lost with the connection.
-        let _ = from.read(&mut [0; 4096]);
-        let body = "<Error><Code>AccessDenied</Code><AWSAccessKeyId>a-key</AWSAccessKeyId></Error>";
-        let head = format!("HTTP/1.1 403 Forbidden\r\nContent-Length: {}\r\nConnection: close\r\n\r\n", body.len());
-        let _ = near.write_all(head.as_bytes()).and_then(|()| near.write_all(body.as_bytes()));
-        let _ = near.shutdown(std::net::Shutdown::Write);
-        return;
-    }
-    let mut answer = Vec::new();
-    let _ = far.read_to_end(&mut answer);
-    match n % 4 {
-        _ if mood == HONEST => {}
-        // Done, and not told.
-        1 => answer = b"HTTP/1.1 500 Oops\r\nContent-Length: 0\r\nConnection: close\r\n\r\n".to_vec(),
-        3 if n % 8 == 3 => answer.truncate(answer.len() - answer.len().min(20)),
-        _ => {}
-    }
-    let _ = near.write_all(&answer);
-    let _ = near.shutdown(std::net::Shutdown::Both);
-    let _ = far.shutdown(std::net::Shutdown::Both);
+/// A proxy before the store.
+fn proxy(store: &Store, mood: Mood) -> Proxy {
+    Proxy::start("127.0.0.1", store.address(), mood, 24)
 }
 
 fn watch(place: &Place, port: u16) -> Command {
@@ -102,7 +49,8 @@ fn a_bucket_gets_the_results_that_a_folder_gets() {
     }
     store.ask("PUT", "/prints/farm/in/bad.stl", b"no mesh");
     place.suture(["watch", "local", "--once", "--settle", "10ms"]).expect(0);
-    for port in [proxy(store.port, &Arc::new(AtomicU8::new(FAILING))), store.port] {
+    let way = proxy(&store, Mood::Failing);
+    for port in [way.address.port(), store.port] {
         let ran = watch(&place, port).output().expect("it runs");
         let said = String::from_utf8_lossy(&ran.stderr).into_owned();
         assert!(!said.contains("a-secret") && !said.contains("a-key"), "{said}");
@@ -142,7 +90,7 @@ fn a_bucket_that_is_not_there_or_not_ours_is_one_line() {
     assert!(said.contains("s3://nowhere/farm: there is no such bucket; see to its name"), "{said}");
     store.ask("PUT", "/prints", b"");
     let place = configured("prints/farm");
-    let said = refused(watch(&place, proxy(store.port, &Arc::new(AtomicU8::new(REFUSING)))));
+    let said = refused(watch(&place, proxy(&store, Mood::Refusing).address.port()));
     assert!(said.contains("s3://prints/farm") && said.contains("AccessDenied"), "{said}");
     let mut command = watch(&place, store.port);
     command.env_remove("AWS_ACCESS_KEY_ID").env("AWS_PROFILE", "farm");
@@ -160,16 +108,16 @@ fn a_bucket_that_is_not_there_or_not_ours_is_one_line() {
 fn an_outage_is_waited_out_and_said_once() {
     let Some(store) = Store::start() else { return };
     store.ask("PUT", "/prints", b"");
-    let (place, mood) = (configured("prints/farm"), Arc::new(AtomicU8::new(DEAD)));
-    let ran = watch(&place, proxy(store.port, &mood)).output().expect("it runs");
+    let (place, way) = (configured("prints/farm"), proxy(&store, Mood::Dead));
+    let ran = watch(&place, way.address.port()).output().expect("it runs");
     assert!(!ran.status.success(), "nothing was looked at: {}", String::from_utf8_lossy(&ran.stderr));
-    mood.store(HONEST, Ordering::SeqCst);
-    let served = Served::of(&place, serve(&place, proxy(store.port, &mood)), "log");
+    way.become_now(Mood::Honest);
+    let served = Served::of(&place, serve(&place, way.address.port()), "log");
     let listed = || place.suture(["jobs", "list", "--dir", "state/buckets/farm"]).expect(0).stdout();
-    for (n, trouble) in [(1, REFUSING), (2, DEAD)] {
+    for (n, trouble) in [(1, Mood::Refusing), (2, Mood::Dead)] {
         let is_there = |name: String| move |store: &Store| store.keys().contains(&name);
         let arrived = is_there(format!("farm/done/{n}.stl"));
-        mood.store(trouble, Ordering::SeqCst);
+        way.become_now(trouble);
         wait_until("the outage is said", || served.lines("The folder cannot be served for now.").len() == n);
         store.ask("PUT", &format!("/prints/farm/in/{n}.stl"), &holes(n as u64));
         let list = listed();
@@ -177,7 +125,7 @@ fn an_outage_is_waited_out_and_said_once() {
         // Some looks go by.
         std::thread::sleep(std::time::Duration::from_secs(5));
         assert!(!arrived(&store), "nobody could have put it there");
-        mood.store(HONEST, Ordering::SeqCst);
+        way.become_now(Mood::Honest);
         wait_until("the drop is done", || arrived(&store));
         assert_eq!(served.lines("The folder cannot be served for now.").len(), n, "once");
         assert_eq!(served.lines("The folder is back.").len(), n);

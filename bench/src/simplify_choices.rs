@@ -20,17 +20,27 @@ pub(crate) struct SimplifyChoices {
     /// Runs of every program over every mesh, in alternation.
     #[arg(long, default_value_t = 3)]
     runs: usize,
+    /// Memory that suture is told to use, such as 1GiB; its peers, which have no such choice, are left out then.
+    #[arg(long)]
+    memory: Option<String>,
+    /// Measure how near a result is up to this size of its input.
+    #[arg(long, value_name = "TRIANGLES", default_value_t = 12_000_000)]
+    judge_up_to: u64,
+    /// Go on where the raw file ends.
+    #[arg(long)]
+    resume: bool,
     #[command(flatten)]
     options: Closing,
 }
 
 impl SimplifyChoices {
-    /// Measures, and publishes; the raw file is made anew.
+    /// Measures, and publishes; the raw file is made anew, unless it is gone on with.
     ///
     /// # Errors
     /// When suture cannot be built, or the system fails.
     pub(crate) fn measure(self) -> Result<ExitCode, Box<dyn Error>> {
-        let asked = compare::simplify::Asked { sizes: self.sizes, ratio: self.ratio, runs: self.runs };
-        closing(self.options, "simplify", false, |options| compare::simplify::simplify(options, &asked))
+        let Self { sizes, ratio, runs, memory, judge_up_to, resume, options } = self;
+        let asked = compare::simplify::Asked { sizes, ratio, runs, memory, judge_up_to };
+        closing(options, "simplify", resume, |options| compare::simplify::simplify(options, &asked))
     }
 }

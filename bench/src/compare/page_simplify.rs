@@ -10,7 +10,7 @@ const ABOUT: &str = "\
 (`pipelines/simplify_*.py`). Wall seconds are of whole processes, from file to file, and Suture judges and certifies its result in them; *alone* is the work itself, by each
 program's own word, and has Suture's proof of the distance in it. *CPU* is what all threads of the process took, which other work on the machine changes less than wall seconds.
 Distances are in millionths of the input's diagonal, from samples on both surfaces: the largest (Hausdorff, two-sided) and the mean (root of squares).
-Crossings are pairs of triangles. `meshoptimizer` stands beside: it takes and gives arrays, and reading and writing them is not its work.
+Crossings are pairs of triangles. *Resident* counts a mapped file, which the system can take back; *own* is memory that it cannot. `meshoptimizer` stands beside: it takes and gives arrays, and reading and writing them is not its work.
 ";
 
 /// The section; empty if there is nothing.
@@ -21,8 +21,8 @@ pub(super) fn simplify(book: &Book) -> String {
     }
     let mut page = format!("\n## Fewer triangles\n\n{ABOUT}\n");
     page += "| triangles | program | left | wall, s | × suture | alone, s | × suture | CPU, s | Hausdorff | mean \
-             | crossings | open edges | resident MB | runs |\n\
-             |---:|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|\n";
+             | crossings | open edges | resident MB | own MB | runs |\n\
+             |---:|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|\n";
     let mut sizes: Vec<u64> = lines.iter().map(|line| line.before).collect();
     sizes.sort_unstable();
     sizes.dedup();
@@ -56,7 +56,7 @@ fn row(runs: &[&Simplified], ours: &[&Simplified]) -> String {
     let is_peer = first.tool != Simplifier::Suture;
     markdown::row(&[
         spaced(first.before),
-        first.tool.name().to_owned(),
+        first.memory.as_ref().map_or(first.tool.name().to_owned(), |memory| format!("{} --memory {memory}", first.tool.name())),
         failure.unwrap_or_else(|| spaced(first.after)),
         or_dash(spread(runs, wall).map(Spread::text)),
         or_dash(times(wall).filter(|_| is_peer)),
@@ -68,6 +68,7 @@ fn row(runs: &[&Simplified], ours: &[&Simplified]) -> String {
         or_dash(nearness.and_then(|near| near.pairs).map(spaced)),
         near(|near| spaced(near.boundary_edges)),
         or_dash(spread(runs, |run| Some(run.cost.peak_resident_bytes as f64 / 1e6)).map(|spread| number(spread.most))),
+        or_dash(spread(runs, |run| Some(run.cost.peak_anonymous_bytes? as f64 / 1e6)).map(|spread| number(spread.most))),
         runs.len().to_string(),
     ])
 }
@@ -81,11 +82,30 @@ mod tests {
 
     fn line(tool: Simplifier, round: usize, [wall, alone]: [f64; 2]) -> Simplified {
         let stages = vec![Stage { name: "simplify".into(), seconds: alone }];
-        let cost = Cost { wall_seconds: wall, cpu_seconds: 1.5, peak_resident_bytes: 5_000_000, stages, ..Cost::default() };
+        let cost = Cost {
+            wall_seconds: wall,
+            cpu_seconds: 1.5,
+            peak_resident_bytes: 5_000_000,
+            peak_anonymous_bytes: Some(4_000_000),
+            stages,
+            ..Cost::default()
+        };
         let near = Nearness { hausdorff: 2e-4, mean: 1.5e-5, samples: 9, pairs: Some(7), boundary_edges: 0 };
         let nearness = (round == 0).then_some(near);
         let (case, program, failure) = ("clean".into(), "p".into(), String::new());
-        Simplified { case, before: 10_000, asked: 2_000, tool, program, round, cost, after: 2_001, nearness, failure }
+        Simplified {
+            case,
+            before: 10_000,
+            asked: 2_000,
+            tool,
+            memory: None,
+            program,
+            round,
+            cost,
+            after: 2_001,
+            nearness,
+            failure,
+        }
     }
 
     #[test]
@@ -96,9 +116,9 @@ mod tests {
         let lines = lines.into_iter().map(|line| Line::Simplified(Box::new(line))).collect();
         let page = simplify(&Book { chapters: vec![Chapter::of("simplify", lines)] });
         for row in [
-            "| 10 000 | suture | 2 001 | 2.00 (1.00–3.00) | – | 0.500 (0.500–0.500) | – | 1.50 | 200 | 15.0 | 7 | 0 | 5.00 | 3 |\n",
-            "| 10 000 | meshlib | 2 001 | 8.00 (8.00–8.00) | 4.00 | 2.00 (2.00–2.00) | 4.00 | 1.50 | 200 | 15.0 | 7 | 0 | 5.00 | 3 |\n",
-            "| 10 000 | pymeshlab | no   memory | – | – | – | – | – | – | – | – | – | – | 1 |\n",
+            "| 10 000 | suture | 2 001 | 2.00 (1.00–3.00) | – | 0.500 (0.500–0.500) | – | 1.50 | 200 | 15.0 | 7 | 0 | 5.00 | 4.00 | 3 |\n",
+            "| 10 000 | meshlib | 2 001 | 8.00 (8.00–8.00) | 4.00 | 2.00 (2.00–2.00) | 4.00 | 1.50 | 200 | 15.0 | 7 | 0 | 5.00 | 4.00 | 3 |\n",
+            "| 10 000 | pymeshlab | no   memory | – | – | – | – | – | – | – | – | – | – | – | 1 |\n",
         ] {
             assert!(page.contains(row), "{page}");
         }

@@ -42,6 +42,9 @@ pub(crate) struct Simplified {
     /// Triangles that were asked for: of a peer, as many as suture left.
     pub(crate) asked: u64,
     pub(crate) tool: Simplifier,
+    /// What suture was told of it.
+    #[serde(default)]
+    pub(crate) memory: Option<String>,
     /// The program that ran.
     pub(crate) program: String,
     pub(crate) round: usize,

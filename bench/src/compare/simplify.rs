@@ -27,6 +27,10 @@ pub(crate) struct Asked {
     /// The share of them that is left.
     pub(crate) ratio: f64,
     pub(crate) runs: usize,
+    /// What suture is told, without peers then.
+    pub(crate) memory: Option<String>,
+    /// The largest mesh of which nearness is measured.
+    pub(crate) judge_up_to: u64,
 }
 
 /// Samples on each surface, beside its vertices where these are fewer.
@@ -46,7 +50,8 @@ pub(crate) fn simplify(options: &Options, asked: &Asked) -> Result<(), Error> {
     for (tool, reason) in Simplifier::ALL.iter().filter_map(|tool| Some((tool, lack(tool)?))) {
         eprintln!("{} is left out: {reason}", tool.name());
     }
-    let tools: Vec<Simplifier> = Simplifier::ALL.into_iter().filter(|tool| lack(tool).is_none()).collect();
+    let is_wanted = |tool: &Simplifier| lack(tool).is_none() && (asked.memory.is_none() || *tool == Simplifier::Suture);
+    let tools: Vec<Simplifier> = Simplifier::ALL.into_iter().filter(is_wanted).collect();
     for &size in &asked.sizes {
         let input = bench.folder.path().join("in.stl");
         let written = generate::write_file_at(CASE, Density::Sparse, size, SEED, &input);
@@ -55,7 +60,7 @@ pub(crate) fn simplify(options: &Options, asked: &Asked) -> Result<(), Error> {
         let mut left = (before.len() as f64 * asked.ratio) as u64;
         for round in 0..asked.runs {
             for &tool in &tools {
-                let simplified = once(&bench, options, (&input, &before), (tool, left), round)?;
+                let simplified = once(&bench, options, asked, (&input, &before), (tool, left), round)?;
                 eprintln!(
                     "{:14} {:>9} of {:>9} triangles {:>9.3} s wall {:>9.3} s alone  {}",
                     tool.name(),
@@ -78,24 +83,27 @@ pub(crate) fn simplify(options: &Options, asked: &Asked) -> Result<(), Error> {
 fn once(
     bench: &Bench,
     options: &Options,
+    Asked { memory, judge_up_to, .. }: &Asked,
     (input, before): (&Path, &[Triangle]),
     (tool, asked): (Simplifier, u64),
     round: usize,
 ) -> Result<Simplified, Error> {
     let output = bench.folder.path().join("out.stl");
-    let child::Ended { mut cost, said } =
-        child::measure(command(bench, tool, (input, &output), asked), Some(&output), true, options.limit)?;
+    let mut command = command(bench, tool, (input, &output), asked);
+    command.args(memory.iter().flat_map(|memory| ["--memory", memory]));
+    let child::Ended { mut cost, said } = child::measure(command, Some(&output), true, options.limit)?;
     let said = listen(&said);
     (cost.stages, cost.facts) = (said.stages, said.facts);
     let after = mesh::read(&output).unwrap_or_default();
-    let nearness = (round == 0 && !after.is_empty()).then(|| nearness(bench, before, (&output, &after)));
+    let is_judged = round == 0 && !after.is_empty() && before.len() as u64 <= *judge_up_to;
+    let nearness = is_judged.then(|| nearness(bench, before, (&output, &after)));
     let failure = if after.is_empty() { cost.complaint.lines().last().unwrap_or(&cost.end).to_owned() } else { String::new() };
     if output.exists() {
         std::fs::remove_file(&output).map_err(Error::io("removing an output"))?;
     }
     let (case, program) = (CASE.to_string(), bench.programs.identity_of(tool.peer())?);
-    let (before, after) = (before.len() as u64, after.len() as u64);
-    Ok(Simplified { case, before, asked, tool, program, round, cost, after, nearness, failure })
+    let (before, after, memory) = (before.len() as u64, after.len() as u64, memory.clone());
+    Ok(Simplified { case, before, asked, tool, memory, program, round, cost, after, nearness, failure })
 }
 
 fn command(bench: &Bench, tool: Simplifier, (input, output): (&Path, &Path), asked: u64) -> Command {

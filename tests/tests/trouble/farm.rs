@@ -10,8 +10,10 @@ use crate::farm_members::{Farm, Member};
 use crate::stage::row;
 use crate::world::{fill_bytes, is_root};
 
-/// Longer than a lease, which is a minute.
-const ROUND: u64 = 75;
+/// Machines fail when all have work.
+const BEGIN: u64 = 10;
+/// Until they are well again: longer than a lease, which is a minute.
+const ROUND: u64 = BEGIN + 75;
 /// Then all is well for so long.
 const CALM: u64 = 15;
 /// A packet of a machine that is held up takes so long, both ways.
@@ -81,22 +83,22 @@ impl Round<'_, '_> {
         for second in 0..ROUND + CALM {
             match (second, is_even) {
                 (0, _) => self.farm.drop_files(self.files.start..half),
-                (2, _) => self.each(|_| true, befall),
-                (5, true) => self.farm.server.kill(),
-                (5, false) => fill_bytes(&filler),
-                (6, _) => self.farm.drop_files(half..self.files.end),
-                (12, true) => self.farm.database.inside(|| self.farm.server.run()),
-                (15, _) => self.each(|fate| fate == Fate::Killed, relieve),
-                (20, true) => self.intake.host.cut(true),
-                (30, false) => {
+                (BEGIN, _) => self.each(|_| true, befall),
+                (13, true) => self.farm.server.kill(),
+                (13, false) => fill_bytes(&filler),
+                (14, _) => self.farm.drop_files(half..self.files.end),
+                (20, true) => self.farm.database.inside(|| self.farm.server.run()),
+                (23, _) => self.each(|fate| fate == Fate::Killed, relieve),
+                (25, true) => self.intake.host.cut(true),
+                (38, false) => {
                     std::fs::remove_file(&filler).expect("there is room again");
                     let log = std::fs::read_to_string(self.farm.server.folder().join("log")).unwrap_or_default();
                     assert!(log.contains("No space left on device"), "the disk was never full: {log}");
                     self.farm.database.inside(|| self.farm.server.run_anew());
                 }
-                (40, true) => self.intake.host.cut(false),
-                (40, false) => self.intake.kill(),
-                (50, false) => self.intake.start(),
+                (45, true) => self.intake.host.cut(false),
+                (45, false) => self.intake.kill(),
+                (55, false) => self.intake.start(),
                 (ROUND, _) => self.each(|fate| fate != Fate::Killed, relieve),
                 _ => {}
             }

@@ -16,6 +16,10 @@
 //! What the outside world owes a job follows from its state alone ([`Job::duty`]), so that recovery after a crash is the same
 //! code as normal work.
 //!
+//! **Witness.** A job may be *sampled*: a first attempt that made a good result leaves a [`Witness`] of it, and the job goes back into the queue, so that a
+//! second attempt, on another host if there is one, makes the result once more. What comes of the comparison is the caller's business; the witness stays with
+//! the job until it is at rest or an operator retries it.
+//!
 //! **Blame.** An attempt is counted when it is claimed, before its worker starts, and is never taken back. It is *charged* to
 //! the file when the worker died of the file: a signal of its own making, the time limit, the memory limit. The second charge
 //! quarantines. A kill from outside is never charged, and a death of the machine (another boot id) never is.
@@ -27,6 +31,7 @@
 
 mod blame;
 mod decision;
+mod hold;
 mod kind;
 mod past;
 mod pauses;
@@ -35,14 +40,17 @@ mod state;
 mod step;
 #[cfg(test)]
 mod tests;
+mod witness;
 mod words;
 
 pub use blame::{Blame, CHARGES, DEATHS_ALONE, DEATHS_IN_HAND, DEATHS_TO_SUSPECT, Death, KILLS_FREE, Testimony};
 pub use decision::{Decision, MAX_BY, NoDecision, Verdict};
+pub use hold::Hold;
 pub use kind::Kind;
 pub use past::{Past, Reached};
-pub use pauses::{BACKOFF_CAP_MS, BACKOFF_MS, ENVIRONMENT_RETRIES, PARK_CAP_MS, PARK_MS, WAIT_MS};
+pub use pauses::{BACKOFF_CAP_MS, BACKOFF_MS, ENVIRONMENT_RETRIES, HAND_ON_MS, PARK_CAP_MS, PARK_MS, WAIT_MS};
 pub use priority::{AGEING_MS, NoPriority, Priority};
-pub use state::{Area, Duty, Ending, Hold, Job, Parked, Publication, Source, State, Step, Withdrawal};
+pub use state::{Area, Duty, Ending, Job, Parked, Publication, Source, State, Step, Withdrawal};
 pub use step::{Event, Illegal};
+pub use witness::{MAX_DAEMON, Witness};
 pub use words::{MAX_REASON, one_line};

@@ -151,7 +151,10 @@ fn name(table: Table, key: &[u8]) -> String {
 mod tests {
     use super::*;
     use crate::id::{Attempt, Boot, Epoch, Hash, JobId, Recipe, Seq, Time, Token};
-    use crate::job::{Area, Blame, Decision, Hold, MAX_BY, MAX_REASON, Parked, Priority, Publication, Source, Verdict, one_line};
+    use crate::job::{
+        Area, Blame, Decision, Hold, MAX_BY, MAX_DAEMON, MAX_REASON, Parked, Priority, Publication, Source, Verdict, Witness,
+        one_line,
+    };
     use crate::path::{MAX_NAMED, MAX_SOURCE, RelPath};
 
     /// Everything a job can hold, as long as it can be: no transition can fail for want of room.
@@ -207,9 +210,19 @@ mod tests {
         job.work = Some(Token(u64::MAX));
         job.note = reason;
         job.seq = Seq(u64::MAX);
+        // No job has both: a witness goes when the job comes to rest, and only then someone decides.
+        let mut sampled = job.clone();
+        let long = "d".repeat(2 * MAX_DAEMON);
+        let witness = Witness::new(&long, &long, Recipe(u64::MAX), Hash([0xff; 32]));
+        sampled.witness = Some(Box::new(Witness { at: Time(u64::MAX), ..witness }));
+        if let State::Publishing { publication, .. } = &mut sampled.state {
+            publication.decision = None;
+        }
         let key = job.id.0.to_be_bytes();
-        let bytes = encode_job(&key, &job).unwrap();
-        assert_eq!(decode::<Job>(Table::Jobs, &key, &bytes).unwrap(), job);
+        for job in [job, sampled] {
+            let bytes = encode_job(&key, &job).unwrap();
+            assert_eq!(decode::<Job>(Table::Jobs, &key, &bytes).unwrap(), job);
+        }
     }
 
     const LATER: u16 = SCHEMA + 1;

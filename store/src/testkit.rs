@@ -41,6 +41,7 @@ pub fn conformance(make: &dyn Fn(Arc<dyn Clock>) -> Box<dyn Subject>) {
         ("folders take turns", turns::folders_take_turns),
         ("a folder has no more in work than it may", turns::a_folder_has_no_more_in_work_than_it_may),
         ("pauses are kept", claims::pauses_are_kept),
+        ("a sampled job keeps its witness", claims::a_sampled_job_keeps_its_witness),
         ("a crash is retried once", deaths::a_crash_is_retried_once),
         ("the operator's wishes", deaths::the_operators_wishes),
         ("death of the daemon", deaths::death_of_the_daemon),

@@ -1,6 +1,7 @@
 //! A job whose record was lost, as the files that it left tell of it.
 
-use super::state::{Area, Hold, Job, Parked, Publication, Source, State};
+use super::hold::Hold;
+use super::state::{Area, Job, Parked, Publication, Source, State};
 use crate::id::{Attempt, JobId, Time, Token};
 use crate::path::RelPath;
 

@@ -12,3 +12,5 @@ pub const WAIT_MS: u64 = 15_000;
 pub const PARK_MS: u64 = 1000;
 /// Longest pause of a parked job.
 pub const PARK_CAP_MS: u64 = 5 * 60_000;
+/// Pause of a job that another host is to have: twice what an idle one takes to look.
+pub const HAND_ON_MS: u64 = 2000;

@@ -4,11 +4,13 @@ use serde::{Deserialize, Serialize};
 
 use super::blame::{Blame, Death};
 use super::decision::{Decision, Verdict};
+use super::hold::Hold;
 use super::kind::Kind;
 use super::pauses::BACKOFF_CAP_MS;
 use super::priority::Priority;
+use super::witness::Witness;
 use super::words::one_line;
-use crate::id::{Attempt, Boot, Epoch, Hash, JobId, Recipe, Seq, Time, Token};
+use crate::id::{Attempt, Hash, JobId, Recipe, Seq, Time, Token};
 use crate::path::RelPath;
 
 /// The dropped file, as it was when it came to rest.
@@ -161,29 +163,6 @@ pub enum Withdrawal {
     Vanished,
 }
 
-/// Who works on a job, and in which life of the daemon.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Hold {
-    /// Which attempt this is.
-    pub attempt: Attempt,
-    /// The life of the daemon that claimed it.
-    pub epoch: Epoch,
-    /// Names the claim; each claim has another one.
-    pub token: Token,
-    /// Nothing else may run meanwhile: the job is suspected of killing the daemon, or needs the whole memory.
-    pub alone: bool,
-    /// The machine's life in which it was claimed.
-    #[serde(default)]
-    pub boot: Boot,
-}
-
-impl Hold {
-    /// Of no life of any daemon: a claim puts its own in the place of this one.
-    pub(super) fn none(attempt: Attempt) -> Self {
-        Self { attempt, epoch: Epoch(0), token: Token(0), alone: false, boot: Boot(0) }
-    }
-}
-
 /// A result that could not be brought into place.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Parked {
@@ -238,6 +217,10 @@ pub enum Step {
     Park { reason: String, committed: bool },
     /// Stopping: the job goes back into the queue at no cost.
     HandBack,
+    /// The first of two attempts made a good result: another attempt is to make it once more, and compare. It costs nothing.
+    Sampled(Box<Witness>),
+    /// It was sampled, and another host has a moment to claim it, so that not one host alone makes both results. It costs nothing.
+    HandOn,
     /// The worker was stopped as the operator asked, and the file is back in its place.
     Cancelled,
     /// The file is not the one that was submitted any more.
@@ -298,6 +281,9 @@ pub struct Job {
     /// It needs the whole memory.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub needs_all: bool,
+    /// What an earlier attempt made, while another one is to make the same.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub witness: Option<Box<Witness>>,
     /// Set while its result cannot be brought into place.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub parked: Option<Parked>,
@@ -338,6 +324,7 @@ impl Job {
             attempts: Attempt(0),
             blame: Blame::default(),
             needs_all: false,
+            witness: None,
             parked: None,
             work: None,
             note: String::new(),

@@ -2,10 +2,11 @@
 
 use super::blame::{Blame, Death, KILLS_FREE, Testimony};
 use super::decision::{Decision, Verdict};
+use super::hold::Hold;
 use super::kind::Kind;
-use super::pauses::{BACKOFF_CAP_MS, BACKOFF_MS, ENVIRONMENT_RETRIES, PARK_CAP_MS, PARK_MS, WAIT_MS};
+use super::pauses::{BACKOFF_CAP_MS, BACKOFF_MS, ENVIRONMENT_RETRIES, HAND_ON_MS, PARK_CAP_MS, PARK_MS, WAIT_MS};
 use super::priority::Priority;
-use super::state::{Ending, Hold, Job, Parked, Publication, State, Step, Withdrawal};
+use super::state::{Ending, Job, Parked, Publication, State, Step, Withdrawal};
 use super::words::one_line;
 use crate::id::{Boot, Epoch, Time, Token};
 
@@ -65,6 +66,8 @@ impl Event {
                 Step::Died(_) => "reported dead",
                 Step::Environment { .. } => "put off",
                 Step::HandBack => "handed back",
+                Step::Sampled(_) => "sampled",
+                Step::HandOn => "handed on",
                 Step::Wait { .. } => "made to wait",
                 Step::NeedsAll => "given the whole memory",
                 Step::Park { .. } => "parked",
@@ -138,6 +141,9 @@ impl Job {
                 _ => return Err(illegal),
             },
         }
+        if matches!(next.state, State::Ended { .. } | State::Cancelled { .. }) {
+            next.witness = None;
+        }
         Ok(next)
     }
 
@@ -202,6 +208,17 @@ impl Job {
                 State::Queued { not_before: Some(now.plus_ms(WAIT_MS)) }
             }
             (State::Running { cancel: false, .. }, Step::HandBack) => NOW,
+            (State::Running { cancel: false, .. }, Step::Sampled(witness)) if self.witness.is_none() => {
+                self.note = "it was computed, and is to be computed once more, for a comparison".into();
+                self.witness = Some(Box::new(witness.at(now)));
+                NOW
+            }
+            (State::Running { cancel: false, .. }, Step::HandOn) if self.witness.is_some() => {
+                State::Queued { not_before: Some(now.plus_ms(HAND_ON_MS)) }
+            }
+            (State::Running { cancel: true, .. }, Step::Sampled(_) | Step::HandOn) => {
+                State::Cancelled { why: Withdrawal::Operator }
+            }
             (State::Running { cancel: false, .. }, Step::NeedsAll) if !hold.alone => {
                 self.needs_all = true;
                 self.note = "its share of the memory was too small; it gets all of it".into();
@@ -284,7 +301,7 @@ impl Job {
         let before = self.blame.environment;
         self.blame.environment = before.saturating_add(1);
         if before >= ENVIRONMENT_RETRIES {
-            return State::Concluded { hold, ending: Ending::Environment, reason: self.note.clone() };
+            return State::Concluded { hold, ending: Ending::Environment, reason: self.last_words() };
         }
         State::Queued { not_before: Some(backoff(before, now)) }
     }
@@ -316,10 +333,15 @@ impl Job {
     /// Back into the queue, or condemned.
     fn judge(&self, hold: Hold) -> State {
         if self.blame.is_condemned() {
-            State::Concluded { hold, ending: Ending::Quarantined, reason: self.note.clone() }
+            State::Concluded { hold, ending: Ending::Quarantined, reason: self.last_words() }
         } else {
             NOW
         }
+    }
+
+    /// Why it ends without a result; one that was made once is told of.
+    fn last_words(&self) -> String {
+        self.witness.as_ref().map_or_else(|| self.note.clone(), |witness| one_line(&format!("{}; {witness}", self.note)))
     }
 
     /// `None`: there is nothing to decide.
@@ -364,6 +386,7 @@ impl Job {
             _ => return None,
         }
         self.blame = Blame::default();
+        self.witness = None;
         self.retried = Some(now);
         self.state = NOW;
         Some(())

@@ -7,8 +7,10 @@ use crate::id::{Attempt, Boot, Epoch, Hash, JobId, Time, Token};
 use crate::path::RelPath;
 
 mod decisions;
+mod sampled;
 
 use decisions::{approved, check_decision, said};
+use sampled::{check_witness, witness};
 
 fn fresh() -> Job {
     let source = Source {
@@ -70,6 +72,8 @@ fn steps() -> impl Strategy<Value = Step> {
         4 => deaths().prop_map(Step::Died),
         2 => Just(Step::Environment { reason: "no space left".into() }),
         1 => Just(Step::HandBack),
+        2 => (0_u8..3).prop_map(|hash| Step::Sampled(Box::new(witness(hash)))),
+        1 => Just(Step::HandOn),
         1 => Just(Step::NeedsAll),
         1 => Just(Step::Wait { reason: "no room".into() }),
         3 => any::<bool>().prop_map(|committed| Step::Park { reason: "permission denied".into(), committed }),
@@ -144,6 +148,7 @@ fn check_transition(before: &Job, event: &Event, after: &Job) -> Result<(), Test
         prop_assert_eq!(intent, publication);
     }
     check_decision(before, event, after)?;
+    check_witness(before, event, after)?;
     if let (State::Ended { publication }, State::Running { .. } | State::Queued { .. } | State::Published { .. }) =
         (&after.state, &before.state)
     {

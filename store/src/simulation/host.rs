@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use super::ground::{LEASE, Seat};
 use super::stage::{Act, Fate, Lost, Stage, word};
-use crate::id::{Hash, JobId, Token};
-use crate::job::{Area, Death, Duty, Ending, Illegal, Job, Publication, State, Step};
+use crate::id::{Hash, JobId, Recipe, Token};
+use crate::job::{Area, Death, Duty, Ending, Illegal, Job, Publication, State, Step, Witness};
 use crate::store::{Claim, Filter, JobStore, Lease, StoreError};
 use crate::testkit::result_of;
 
@@ -243,6 +243,10 @@ impl Stage {
             7 => Step::HandBack,
             8..14 => Step::Intend(publication(job, claim.token, Ending::NotGood)),
             14..18 => Step::Intend(publication(job, claim.token, Ending::Unreadable)),
+            18..24 if job.witness.is_none() => {
+                Step::Sampled(Box::new(Witness::new("a host", "1", Recipe(claim.token.0), Hash([1; 32]))))
+            }
+            18..20 => Step::HandOn,
             _ => Step::Intend(publication(job, claim.token, Ending::Repaired)),
         }
     }

@@ -1,9 +1,9 @@
 //! What is taken in, and who may claim it when.
 
-use crate::id::{Attempt, JobId, Time};
+use crate::id::{Attempt, Hash, JobId, Recipe, Time};
 use crate::job::{
-    AGEING_MS, Area, BACKOFF_CAP_MS, BACKOFF_MS, Death, Duty, ENVIRONMENT_RETRIES, Ending, Illegal, Job, Kind, Priority, State,
-    Step, Withdrawal,
+    AGEING_MS, Area, BACKOFF_CAP_MS, BACKOFF_MS, Death, Duty, ENVIRONMENT_RETRIES, Ending, HAND_ON_MS, Illegal, Job, Kind,
+    Priority, State, Step, Withdrawal, Witness,
 };
 use crate::path::RelPath;
 use crate::store::{Control, Filter, JobStore, Lease, Query, Seen, StoreError, Submission};
@@ -209,6 +209,33 @@ pub(super) fn claims_are_fenced(subject: &mut dyn Subject, _: &ManualClock) -> R
     // Void even before anyone recovers it.
     assert_eq!(subject.store().heartbeat(&new)?, Lease::Lost);
     fenced(subject.store().advance(&new, Step::Intend(result_of(&new.job, Ending::Clean))));
+    Ok(())
+}
+
+/// What the first attempt made is known to whoever comes next, in whatever life, and nothing of it is left in the end.
+pub(super) fn a_sampled_job_keeps_its_witness(subject: &mut dyn Subject, clock: &ManualClock) -> Result<(), StoreError> {
+    let store = subject.store();
+    let id = submit_one(store, "part.stl", 84)?;
+    let witness = Witness::new("a:/state", "1.0.0", Recipe(u64::MAX), Hash([7; 32]));
+    let waits = store.advance(&claim_any(store)?, Step::Sampled(Box::new(witness.clone())))?;
+    let kept = Some(Box::new(Witness { at: waits.changed, ..witness.clone() }));
+    assert_eq!((waits.kind(), &waits.witness), (Kind::Queued, &kept));
+    clock.pass(7);
+    let claim = claim_any(store)?;
+    assert_eq!((&claim.job.witness, claim.job.changed), (&kept, waits.changed.plus_ms(7)));
+    let again = store.advance(&claim, Step::Sampled(Box::new(witness)));
+    assert!(matches!(again, Err(StoreError::Illegal { source: Illegal::State { .. }, .. })), "{again:?}");
+    assert_eq!(store.advance(&claim, Step::HandOn)?.kind(), Kind::Waiting);
+    assert_eq!(store.claim(&Filter::default())?, None, "it rests for a moment");
+    clock.pass(HAND_ON_MS);
+    claim_any(store)?;
+    subject.restart();
+    let store = subject.store();
+    store.recover(&no_one_is_innocent)?;
+    let claim = claim_any(store)?;
+    assert_eq!((claim.job.witness.clone(), claim.job.attempts), (kept, Attempt(4)));
+    assert_eq!(finish(store, &claim, Ending::Repaired, true)?.witness, None);
+    assert_eq!(job(store, id)?.witness, None);
     Ok(())
 }
 

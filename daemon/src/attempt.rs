@@ -10,7 +10,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use crossbeam::channel::Sender;
-use suture_core::{ErrorClass, Profile, Report};
+use suture_core::{ErrorClass, Profile};
 use suture_store::Lease;
 use suture_store::job::{Duty, Kind, Withdrawal};
 use suture_store::patience::brief;
@@ -22,11 +22,9 @@ use crate::choice;
 use crate::claim::{CLAIMED, Claimed, Unclaimed, claim, let_go};
 use crate::config::Config;
 use crate::create;
-use crate::event::Happening;
 use crate::event_bus::Bus;
 use crate::folder::Folder;
 use crate::force::is_forced;
-use crate::fsx::Identity;
 use crate::handed::Handed;
 use crate::past::Unread;
 use crate::publish::{Conclusion, Desk, OUTPUT, discard, litter};
@@ -40,10 +38,12 @@ use crate::supervise::{Cause, Ended};
 use crate::world::World;
 
 mod carry;
+mod conclude;
 mod request;
 mod staff;
 mod worked;
 
+use conclude::Onward;
 pub(crate) use request::{IN_HAND, WITNESS};
 use request::{limits, request};
 use staff::Staff;
@@ -319,6 +319,9 @@ impl Slot {
     /// Lets a worker loose on the file, and says what came of it.
     fn attempt(&mut self, folder: &Folder, token: &Claim, job: &Job, turn: Turn) -> Result<Option<Job>, PublishError> {
         let context = Arc::clone(&self.context);
+        if self.is_for_another(job) {
+            return Ok(Some(context.store.advance(token, Step::HandOn)?));
+        }
         let work = folder.work(token.token);
         // The token is new: a folder of that name was left by the daemon of another store, which had the hot folder before.
         remove_work(&work);
@@ -344,21 +347,10 @@ impl Slot {
                 }
                 let worked = self.work(folder, token, job, &claimed, turn);
                 self.computed();
-                let desk = Desk::new(&*context.store, folder, token, &self.committed);
-                match worked {
-                    Worked::Report { report, written, reused } => match verify(&report, written.as_ref(), &work) {
-                        Ok(()) => {
-                            if reused.is_none() {
-                                context.bus.tell(&Happening::Reported { report: &report });
-                            }
-                            let conclusion = Conclusion::Report { report, ctime_ns: claimed.ctime_ns(), reused };
-                            return desk.intend(job, &conclusion).map(Some);
-                        }
-                        Err(reason) => Step::Environment { reason },
-                    },
-                    Worked::None(ending, reason) => return desk.intend(job, &Conclusion::None { ending, reason }).map(Some),
-                    Worked::Step(step) => step,
-                    Worked::Lost => return Ok(None),
+                match self.conclude(folder, token, job, claimed.ctime_ns(), worked)? {
+                    Onward::Job(job) => return Ok(Some(*job)),
+                    Onward::Step(step) => step,
+                    Onward::Lost => return Ok(None),
                 }
             }
         };
@@ -369,6 +361,7 @@ impl Slot {
         let_go(folder, token.token);
         let next = context.store.advance(token, step)?;
         crash_point("daemon.given_back");
+        self.tell_condemned(job, &next);
         Ok(Some(next))
     }
 
@@ -430,8 +423,8 @@ impl Slot {
         }
     }
 
-    /// Has a copy of an earlier result instead, where there is one for this file; after a person's retry, or where it is forced, it is worked on in
-    /// any case.
+    /// Has a copy of an earlier result instead, where there is one for this file; after a person's retry, for a comparison, or where it is forced, it is
+    /// worked on in any case.
     fn copied(
         &self,
         config: &Config,
@@ -441,10 +434,8 @@ impl Slot {
         claimed: &Claimed,
         profile: &Profile,
     ) -> Option<Worked> {
-        // Another tool path, brush or mask of the same name makes another result.
-        let residue = &profile.residue;
-        let has_path = [&residue.toolpath, &residue.brush, &residue.mask].into_iter().any(|name| !name.is_empty());
-        if has_path || !config.reuse || job.retried.is_some() || is_forced(&job.source.path) {
+        let is_asked_for = job.retried.is_some() || job.witness.is_some() || is_forced(&job.source.path);
+        if beside::has_any(profile) || !config.reuse || is_asked_for {
             return None;
         }
         let (context, work) = (&self.context, folder.work(claim.token));
@@ -470,20 +461,6 @@ impl Slot {
             Lease::Lost => Worked::Lost,
             Lease::Held => Worked::Step(Step::HandBack),
         }
-    }
-}
-
-/// Is the output the very file that the worker wrote, synced and read back?
-fn verify(report: &Report, written: Option<&Identity>, work: &Path) -> Result<(), String> {
-    match (&report.output, written) {
-        (None, _) if report.outcome.is_good() => Err("the engine reports a result, but there is none".into()),
-        (None, _) => Ok(()),
-        (Some(facts), Some(written)) => match Identity::of(&work.join(OUTPUT)) {
-            Ok(found) if found == *written && found.size == facts.bytes => Ok(()),
-            Ok(_) => Err("the result is not the file any more that was written and read back".into()),
-            Err(error) => Err(format!("the result cannot be looked at: {error}")),
-        },
-        (Some(_), None) => Err("the result could not be looked at when it was written".into()),
     }
 }
 

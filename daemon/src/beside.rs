@@ -79,6 +79,11 @@ impl Role {
     }
 }
 
+/// Does a profile name any? Another file of the same name makes another result.
+pub(crate) fn has_any(profile: &Profile) -> bool {
+    Role::ALL.into_iter().any(|role| !role.setting(&mut profile.residue.clone()).is_empty())
+}
+
 /// Lets a profile name these files where they are to be read.
 pub(crate) fn put(companions: &[Companion], profile: &mut Profile) {
     for companion in companions {

@@ -11,6 +11,7 @@ use suture_store::{Address, Priority, Roles, Share, Shares};
 
 use crate::bucket::address::BucketAddress;
 use crate::own_profile::OwnProfile;
+use crate::sample::SHARED_ONE_IN;
 use crate::units::show_size;
 use crate::window::{RunWindow, TimeOfDay};
 use api::Api;
@@ -26,6 +27,7 @@ pub(crate) mod events;
 pub(crate) mod keep;
 pub(crate) mod read;
 pub(crate) mod roles;
+mod sampling;
 mod shared;
 pub(crate) mod show;
 pub(crate) mod taken;
@@ -131,6 +133,8 @@ pub(crate) struct Config {
     pub night_ends: TimeOfDay,
     /// A result that was made of the same content before is copied, not made once more.
     pub reuse: bool,
+    /// Of so many jobs one is computed twice, and compared; 0: none, `None`: by where the jobs are.
+    pub check_one_in: Option<u64>,
     /// What goes by itself, and when.
     pub keep: Keep,
     /// The web interface; `None`: there is none.
@@ -163,6 +167,7 @@ impl Config {
             workers_outside: 0,
             night_ends: TimeOfDay::SEVEN,
             reuse: true,
+            check_one_in: None,
             keep: Keep::default(),
             api: None,
             events: Events::default(),
@@ -183,6 +188,11 @@ impl Config {
         Err(format!("{memory} of memory are too little for {} workers: they need {least} together", self.workers))
     }
 
+    /// Of so many jobs one is computed twice; 0: none.
+    pub(crate) fn check_one_in(&self) -> u64 {
+        self.check_one_in.unwrap_or(if self.store.is_some() { SHARED_ONE_IN } else { 0 })
+    }
+
     /// How the hot folders share the work.
     pub(crate) fn shares(&self) -> Shares {
         self.folders.iter().map(|folder| (folder.name.clone(), folder.share)).collect()
@@ -199,6 +209,8 @@ impl Config {
     }
 }
 
+/// For what the daemon chooses by itself.
+pub(crate) const AUTO: &str = "auto";
 /// The profile of a folder that names none.
 pub(crate) const DEFAULT_PROFILE: &str = "default";
 

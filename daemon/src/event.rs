@@ -8,6 +8,7 @@ use suture_store::job::Death;
 use suture_store::{Control, Ending, Job, JobId, Kind, Publication, State, Step, Submission};
 
 use crate::event_metrics::{Count, Metrics, Timing};
+use crate::sample::Compared;
 
 /// Something that happened.
 #[derive(Debug)]
@@ -18,6 +19,8 @@ pub(crate) enum Happening<'a> {
     Began { job: &'a Job },
     /// The engine has made a result of it.
     Reported { report: &'a Report },
+    /// It was computed for the second time, and compared with the first.
+    Compared { job: &'a Job, compared: &'a Compared },
     /// It went on by this step, to where it stands now.
     Moved { job: &'a Job, step: &'a Step },
     /// An operator, or the daemon itself, wanted this of it.
@@ -87,6 +90,9 @@ pub(crate) fn begin(metrics: &Metrics) {
     for kind in Recovery::KINDS {
         metrics.add(Count::StoreRecoveries, &[("kind", kind)], 0);
     }
+    for result in Compared::WORDS {
+        metrics.add(Count::Samples, &[("result", result)], 0);
+    }
 }
 
 /// Word of an event, on its way out.
@@ -111,6 +117,7 @@ impl Happening<'_> {
                     tracing::warn!(job = id.0, file = %submission.source.path, what, "Left where it is.");
                 }
             }
+            Self::Compared { job, compared } => log_compared(job, compared),
             Self::Moved { job, step } => log_moved(job, step),
             Self::Wished { job, wish } => {
                 if matches!(wish, Control::Retry | Control::Cancel | Control::Rank(_) | Control::Decide(_)) {
@@ -147,6 +154,7 @@ impl Happening<'_> {
                 metrics.observe(Timing::JobDuration, &[("stage", "queue")], waited as f64 / 1000.0);
             }
             Self::Reported { report } => count_report(metrics, report),
+            Self::Compared { compared, .. } => metrics.add(Count::Samples, &[("result", compared.word())], 1),
             Self::Moved { job, step } => {
                 if let Some(reason) = failure(step) {
                     metrics.add(Count::JobFailures, &[("reason", reason)], 1);
@@ -182,6 +190,7 @@ impl Happening<'_> {
             Self::FolderAway { name, .. } => ("folder", json!({"folder": name, "reachable": false})),
             Self::FolderBack { name, .. } => ("folder", json!({"folder": name, "reachable": true})),
             Self::Reported { .. }
+            | Self::Compared { .. }
             | Self::Delivered { .. }
             | Self::NotDelivered { .. }
             | Self::GivenUp { .. }
@@ -201,6 +210,18 @@ fn of_job(job: &Job) -> Value {
         told.insert("reason".into(), json!(publication.reason));
     }
     told
+}
+
+/// What came of computing a job twice.
+fn log_compared(job: &Job, compared: &Compared) {
+    let first = job.witness.as_ref().map(|witness| witness.daemon.as_str());
+    let (job, result) = (job.id.0, compared.word());
+    match compared {
+        Compared::Equal => tracing::info!(job, result, first, "Computed twice: both results are the same."),
+        Compared::Different(reason) => tracing::error!(job, result, first, reason, "Computed twice: the results differ."),
+        Compared::OtherVersion => tracing::info!(job, result, first, "Computed twice, by two versions: nothing is compared."),
+        Compared::NotCompared => tracing::info!(job, result, first, "A second attempt cannot be compared with the first."),
+    }
 }
 
 /// The end of an attempt, of a job, or of what was to be its end.

@@ -19,6 +19,7 @@ pub(crate) enum Count {
     StoreRecoveries,
     EventsLost,
     Deliveries,
+    Samples,
 }
 
 /// Measurements that are made again and again.
@@ -30,7 +31,7 @@ pub(crate) enum Timing {
 }
 
 impl Count {
-    const ALL: [Self; 12] = [
+    const ALL: [Self; 13] = [
         Self::JobsFinished,
         Self::JobFailures,
         Self::JobAttempts,
@@ -43,6 +44,7 @@ impl Count {
         Self::StoreRecoveries,
         Self::EventsLost,
         Self::Deliveries,
+        Self::Samples,
     ];
 
     fn words(self) -> (&'static str, &'static str) {
@@ -64,6 +66,7 @@ impl Count {
             Self::Deliveries => {
                 ("suture_webhook_deliveries_total", "Messages to webhooks, and runs of `on_done`, by target and result.")
             }
+            Self::Samples => ("suture_samples_total", "Jobs that were computed twice, by what came of the comparison."),
         }
     }
 }

@@ -70,6 +70,7 @@ mod remove;
 mod retention;
 mod reuse;
 mod rights;
+mod sample;
 mod say;
 mod scan;
 mod schedule;

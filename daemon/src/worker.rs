@@ -78,7 +78,10 @@ fn answer(request: &Request, files: &mut confine::Files) -> Message {
     let length = std::fs::metadata(&request.input).map_or(0, |meta| meta.len());
     let wanted = confine::file_bound(length, request.limits.memory_bytes);
     let most = files.bound(wanted);
-    match work(request) {
+    let worked = work(request);
+    #[cfg(feature = "crash-points")]
+    let worked = worked.map(|report| hook::spoil(request, report));
+    match worked {
         Ok(report) => {
             let output = request.output.as_deref().filter(|_| report.output.is_some());
             let written = output.and_then(|path| std::fs::metadata(path).ok()).map(|meta| Identity::from(&meta));
@@ -214,13 +217,30 @@ mod orphan {
 }
 
 /// Faults on demand, for the tests of the supervisor and of the daemon: a build with the feature `crash-points` looks for
-/// `!abort!`, `!segv!`, `!hang!`, `!reach!`, `!kill-parent!`, `!memory!`, `!panic!` or `!slow!` in the input's name. (The daemon looks for
-/// `!kill-daemon!`: it dies of the answer.)
+/// `!abort!`, `!segv!`, `!flip!`, `!hang!`, `!reach!`, `!kill-parent!`, `!memory!`, `!panic!` or `!slow!` in the input's name. (The daemon looks
+/// for `!kill-daemon!`: it dies of the answer.)
 #[cfg(feature = "crash-points")]
 mod hook {
     use std::time::Duration;
 
+    use suture_core::Report;
+
+    use crate::create;
     use crate::protocol::Request;
+
+    /// As faulty memory does: some bytes of the result are others in each attempt, and nobody notices.
+    pub(super) fn spoil(request: &Request, mut report: Report) -> Report {
+        let Some(output) = request.output.as_deref().filter(|_| request.shown_input.contains("!flip!")) else { return report };
+        let mut bytes = std::fs::read(output).unwrap_or_default();
+        let noise = std::time::UNIX_EPOCH.elapsed().unwrap_or_default().as_nanos().to_le_bytes();
+        // Within the head of a binary STL file.
+        bytes.iter_mut().skip(40).zip(noise).for_each(|(byte, other)| *byte = other);
+        let is_written = std::fs::remove_file(output).and_then(|()| create::write_new(output, &bytes)).is_ok();
+        if let (true, Some(facts)) = (is_written, &mut report.output) {
+            facts.blake3 = blake3::hash(&bytes).to_hex().to_string();
+        }
+        report
+    }
 
     pub(super) fn act(request: &Request) {
         let name = &request.shown_input;

@@ -11,6 +11,8 @@ mod carried;
 mod deaths;
 #[path = "crash/lost.rs"]
 mod lost;
+#[path = "crash/sampled.rs"]
+mod sampled;
 #[path = "crash/shared.rs"]
 mod shared;
 #[path = "crash/taken.rs"]

@@ -27,8 +27,8 @@ pub(super) struct Staff {
 }
 
 impl Staff {
-    /// A worker for this job of this folder: the slot's own while it is in good shape, or a new one. `is_away`: must nobody look below this folder
-    /// of attempts now?
+    /// A worker for this job of this folder: the slot's own while it is in good shape, or a new one, as for a comparison. `is_away`: must nobody look
+    /// below this folder of attempts now?
     ///
     /// # Errors
     /// When the machine has none to give.
@@ -43,7 +43,7 @@ impl Staff {
     ) -> io::Result<Box<dyn Hand>> {
         let is_outside = self.fence.take_in(&folder.work_root())?;
         let other = is_outside || self.memory != limits.memory_bytes;
-        let fresh = turn.is_alone() || other || job.blame.charges > 0 || self.served >= FILES_PER_WORKER;
+        let fresh = turn.is_alone() || other || job.blame.charges > 0 || job.witness.is_some() || self.served >= FILES_PER_WORKER;
         if let Some(mut worker) = self.worker.take().filter(|_| !fresh)
             && worker.is_alive()
         {

@@ -17,16 +17,14 @@ use super::bucket;
 use super::events::{self, OnDoneFile, WebhookFile};
 use super::keep::{Bound, Keep};
 use super::roles;
+use super::sampling::OneIn;
 use super::shared::StoreFile;
 use super::taken::OnTaken;
-use super::{Config, DEFAULT_PROFILE, FolderConfig, name_of, real};
+use super::{AUTO, Config, DEFAULT_PROFILE, FolderConfig, name_of, real};
 use crate::own_profile::OwnProfile;
 use crate::profiles::{self, place_of, with_line};
 use crate::units::{parse_duration, parse_listen, parse_size};
 use crate::window::{RunWindow, TimeOfDay};
-
-/// For what the daemon chooses by itself.
-pub(crate) const AUTO: &str = "auto";
 
 /// As it is written.
 #[derive(Debug, Deserialize)]
@@ -52,6 +50,7 @@ struct File {
     workers_outside: Option<Spanned<u16>>,
     night_ends: Option<TimeOfDay>,
     reuse: Option<bool>,
+    check_one_in: Option<OneIn>,
     keep: Option<Spanned<KeepFile>>,
     api: Option<Spanned<ApiFile>>,
     #[serde(default)]
@@ -263,6 +262,7 @@ fn from_text(text: &str) -> Result<Config, String> {
     }
     config.workers_outside = file.workers_outside.map_or(0, |count| count.into_inner().into());
     config.reuse = file.reuse.unwrap_or(config.reuse);
+    config.check_one_in = file.check_one_in.and_then(|one_in| one_in.0);
     config.run_window = file.run_window.unwrap_or_default();
     config.night_ends = file.night_ends.unwrap_or(config.night_ends);
     if let Some(of_file) = file.keep {

@@ -10,15 +10,15 @@ use toml::Value;
 use super::api::Api;
 use super::events::{Events, Occasion, OnDone, Webhook};
 use super::keep::Keep;
-use super::read::AUTO;
-use super::{Config, FolderConfig};
+use super::{AUTO, Config, FolderConfig};
 use crate::own_profile::OwnProfile;
 use crate::units::{write_duration, write_size};
 use crate::window::RunWindow;
 
 /// For whoever reads the text.
 const HEAD: &str = "\
-# Every setting, as it counts. \"auto\": by file system; settle 5s and rescan 60s, on network mounts 30s and 10s; with --once settle 300ms.
+# Every setting, as it counts. \"auto\": by file system; settle 5s and rescan 60s, on network mounts 30s and 10s; with --once settle 300ms;
+# check_one_in 1000 where the jobs are in a database that machines share, else 0.
 ";
 
 /// Settings of one value, each with the value as it stands in a file; `None`: it stands in none. The same names for every configuration.
@@ -36,6 +36,7 @@ pub(crate) fn values(config: &Config) -> Vec<(&'static str, Option<String>)> {
         ("rescan", auto(config.rescan)),
         ("drain", quoted(&write_duration(config.drain))),
         ("reuse", config.reuse.to_string()),
+        ("check_one_in", config.check_one_in.map_or_else(|| quoted(AUTO), |one_in| one_in.to_string())),
         ("night_ends", quoted(&config.night_ends.to_string())),
         ("time_limit.base", quoted(&write_duration(config.time_limit.base))),
         ("time_limit.per_gib", quoted(&write_duration(config.time_limit.per_gib))),
@@ -230,6 +231,7 @@ mod tests {
         config.night_ends = "06:30".parse().unwrap();
         (config.memory, config.large, config.reserve) = (3 << 30, 1_500_000_000, 1);
         (config.workers, config.threads, config.reuse) = (7, 3, false);
+        config.check_one_in = Some(0);
         config.largest = Some(7 << 30);
         (config.settle, config.rescan) = (Some(Duration::from_millis(300)), Some(Duration::from_secs(90)));
         (config.drain, config.time_limit.base) = (Duration::ZERO, Duration::from_millis(1500));

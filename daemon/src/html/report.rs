@@ -7,6 +7,7 @@ use suture_core::{FIDELITY_RULES, RULES, Report};
 
 use super::page;
 use super::words::prose;
+use crate::sample::is_difference;
 use crate::say::plain;
 use crate::shaped;
 use crate::table;
@@ -50,6 +51,11 @@ fn headline(report: &Report) -> (&'static str, &'static str, &'static str) {
     match (report.outcome, report.task) {
         (Outcome::Clean, _) => ("Clean", "good", "It is sound as it came. Print it."),
         (Outcome::Repaired, _) => ("Repaired", "good", "The result passed every check of its profile. Print the result."),
+        (Outcome::NeedsReview, _) if report.verdict.reasons.iter().any(|reason| is_difference(reason)) => (
+            "Needs review",
+            "review",
+            "It was computed twice, and the results differ. Use neither before the cause is known: the reason says what to do.",
+        ),
         (Outcome::NeedsReview, _) => (
             "Needs review",
             "review",
@@ -360,6 +366,15 @@ mod tests {
             assert!(text.contains(words) && text.contains("<h1>part.stl</h1>"), "{text}");
             assert!(!text.contains("<img") && !text.contains("<script"), "no picture, no script");
         }
+    }
+
+    /// No picture tells which of two results is right.
+    #[test]
+    fn two_results_are_no_matter_of_looks() {
+        let mut report = sample(Outcome::NeedsReview);
+        report.verdict.reasons = vec!["computed twice, with two results: a made one".into()];
+        let text = whole(&report, None).into_string();
+        assert!(text.contains("Use neither before the cause is known") && !text.contains("Look at the picture"), "{text}");
     }
 
     #[test]

@@ -6,6 +6,7 @@ use suture_store::{Ending, Job, Kind, State, Time};
 
 use crate::left::area;
 use crate::night::NEED_SOMEONE;
+use crate::sample::is_difference;
 use crate::say::plain;
 use crate::shown::{hint, when};
 use crate::units::{show_count, show_when};
@@ -94,15 +95,23 @@ pub(crate) fn advice(job: &Job) -> String {
 /// The same beside a link to the job's page, which says all of it.
 pub(crate) fn brief_advice(job: &Job) -> String {
     match job.kind() {
-        Kind::NeedsReview => "Open it and look at the pictures; then approve or reject it.".into(),
+        Kind::NeedsReview if !has_two_results(job) => "Open it and look at the pictures; then approve or reject it.".into(),
         _ => advice(job),
     }
+}
+
+/// Was it computed twice, with two results?
+fn has_two_results(job: &Job) -> bool {
+    job.publication().is_some_and(|publication| is_difference(&publication.reason))
 }
 
 fn ended(job: &Job, ending: Ending) -> String {
     match ending {
         Ending::Clean | Ending::Repaired if hint(job).is_some() => "Read the note. If the part is as it was meant, print the result.".into(),
         Ending::Clean | Ending::Repaired => "Print the result.".into(),
+        Ending::NeedsReview if has_two_results(job) => {
+            "Use neither result. Do what the reason says to find the cause, then try again.".into()
+        }
         Ending::NeedsReview => {
             let best = job.publication().and_then(|publication| publication.output.as_ref());
             let best = best.map_or_else(|| "the result".to_owned(), |name| format!("{}/{name}", area(ending.area())));
@@ -191,6 +200,10 @@ mod tests {
         }
         assert_eq!(parked.kind(), Kind::Parked);
         assert!(advice(&all[2]).contains("failed/a.best.stl"));
+        let State::Ended { mut publication } = all[2].state.clone() else { panic!("it has ended") };
+        publication.reason = "computed twice, with two results: a made one".into();
+        let differs = Job { state: State::Ended { publication }, ..job() };
+        assert!(advice(&differs).starts_with("Use neither result.") && brief_advice(&differs) == advice(&differs));
         assert_eq!(advice(&job()), "", "what waits needs no one");
         // What is good, to be looked at, or bad is told by more than its colour.
         let words: std::collections::BTreeSet<_> = Kind::ALL.iter().map(|kind| (label(*kind), class(*kind))).collect();

@@ -141,6 +141,7 @@ fn f15_summer_time_and_clocks_that_jump_lose_no_job_and_keep_none_waiting() {
             drain: 60,
             results: 3,
             history_jobs: 30_000,
+            check_one_in: 2,
         };
         let stage = Stage::new(seed, begin, NIGHT, plan);
         watched(seed, &stage, |stage| {

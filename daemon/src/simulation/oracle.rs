@@ -161,8 +161,12 @@ impl Oracle {
         self.busy[usize::from(!share.many)] -= 1;
     }
 
-    /// Nothing is computed of which there is a good result.
+    /// Nothing is computed of which there is a good result, but for a comparison.
     fn is_needed(&self, stage: &Stage, matter: Matter) {
+        let running = stage.life().store().list(&Query { kinds: vec![Kind::Running], ..Query::default() }).unwrap();
+        if running.iter().max_by_key(|job| job.work).is_some_and(|job| job.witness.is_some()) {
+            return;
+        }
         for path in self.standing.get(&matter).into_iter().flatten() {
             let Some(seen) = self.results.get(path) else { continue };
             let job = stage.life().store().get(seen.job).unwrap();

@@ -23,6 +23,8 @@ pub(super) struct Plan {
     /// Days after which results go.
     pub results: u64,
     pub history_jobs: u64,
+    /// Of so many jobs one is computed twice; 0: none.
+    pub check_one_in: u64,
 }
 
 impl Plan {
@@ -34,6 +36,7 @@ impl Plan {
             drain: chance.between(1, 99),
             results: chance.between(1, 3),
             history_jobs: chance.pick(&[20, 200, 30_000]),
+            check_one_in: chance.pick(&[0, 1, 3]),
         }
     }
 }
@@ -81,12 +84,12 @@ impl Place {
 
     /// Writes the configuration.
     pub(super) fn write(&self, plan: &Plan) {
-        let Plan { workers, priorities: [hot, left], drain, results, history_jobs, .. } = plan;
+        let Plan { workers, priorities: [hot, left], drain, results, history_jobs, check_one_in, .. } = plan;
         let window = plan.window.map_or(String::new(), |window| format!("run_window = \"{window}\"\n"));
         let (state, archive) = (self.state(), self.archive());
         let text = format!(
             "state = {state:?}\nworkers = {workers}\nthreads = 2\nmemory = \"64MiB\"\nlarge = \"4KiB\"\nreserve = \"1MiB\"\nsettle = \"5s\"\n\
-             rescan = \"10s\"\ndrain = {drain}\n{window}time_limit.base = \"2m\"\n\
+             rescan = \"10s\"\ndrain = {drain}\ncheck_one_in = {check_one_in}\n{window}time_limit.base = \"2m\"\n\
              [keep]\nresults = \"{results}d\"\nreports = \"4d\"\noriginals_size = \"3KiB\"\narchive = {archive:?}\nhistory_jobs = {history_jobs}\n\
              [[folders]]\nname = \"hot\"\npath = {:?}\npriority = {hot}\n\
              [[folders]]\nname = \"left\"\npath = {:?}\npriority = {left}\nleave_originals = true\n",

@@ -25,7 +25,7 @@ const MOST_STORE: u64 = 64 << 20;
 
 fn plan(_: &mut Chance) -> Plan {
     let (workers, window) = (3, Some("20:00-07:00"));
-    Plan { workers, window, priorities: [5, 5], drain: 60, results: 2, history_jobs: HISTORY_JOBS }
+    Plan { workers, window, priorities: [5, 5], drain: 60, results: 2, history_jobs: HISTORY_JOBS, check_one_in: 100 }
 }
 
 /// The most memory that this process ever held, in bytes.

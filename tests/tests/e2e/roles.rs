@@ -239,6 +239,38 @@ fn a_host_is_drained_and_resumed_and_all_hosts_are_shown() {
     farm.assert_done(3);
 }
 
+/// One host makes the first result of each drop, the other one the second; one of them is published, and it is that of a folder.
+#[test]
+fn each_drop_is_computed_on_two_hosts_and_published_once() {
+    let Some(farm) = Farm::new() else { return };
+    farm.configure("shows", "");
+    let shows = farm.start("shows", "intake,control");
+    let works = ["one", "two"].map(|host| {
+        farm.configure(host, "");
+        let text = String::from_utf8(farm.place.read(&format!("{host}.toml"))).expect("text");
+        farm.place.put(&format!("{host}.toml"), format!("check_one_in = 1\n{text}").as_bytes());
+        farm.start(host, "worker")
+    });
+    farm.drop_files(1..=4);
+    farm.wait_for(4);
+    farm.assert_done(4);
+    let jobs = shared_jobs(&farm.place, &farm.url);
+    assert!(jobs.iter().all(|job| job.2 == "done" && job.3 >= 2), "{jobs:?}");
+    let compared = works.iter().zip(["two", "one"]).flat_map(|(host, other)| {
+        let other = format!(":{}", farm.place.at(other).display());
+        let is_by = move |first: &Value| first.as_str().is_some_and(|first| first.ends_with(&other));
+        host.lines("Computed twice: both results are the same.")
+            .into_iter()
+            .map(move |line| (line["job"].as_u64(), is_by(&line["first"])))
+    });
+    let mut compared: Vec<_> = compared.collect();
+    compared.sort_unstable();
+    assert!(compared.iter().map(|(job, _)| *job).eq((1..=4).map(Some)), "each once: {compared:?}");
+    let by_another = compared.iter().filter(|(_, by_another)| *by_another).count();
+    assert_eq!(by_another, 4);
+    drop(shows);
+}
+
 /// A file that no host may take waits, and it is said which; a host that takes it does.
 #[test]
 fn a_file_that_is_too_large_for_all_waits_for_one_that_takes_it() {

@@ -66,15 +66,19 @@ mod transfer;
 mod turns;
 mod write;
 
-use claim::Life;
+use claim::{Ask, Claiming, Life};
 use database::{Again, Database, Failure, wait};
 use leases::Claims;
 use open::As;
 pub use open::{Shared, role};
-use step::{Tried, Way};
+use step::{Stepping, Tried, Way};
 use together::Together;
 use turns::Folders;
 use write::By;
+
+/// So many statements of claims and of steps are under way at a time; what comes meanwhile goes with the next.
+const CLAIMS_AT_ONCE: usize = 2;
+const STEPS_AT_ONCE: usize = 4;
 
 /// The shared [`JobStore`].
 pub struct PostgresStore {
@@ -84,7 +88,8 @@ pub struct PostgresStore {
     database: Arc<Database>,
     life: Life,
     claims: Arc<Claims>,
-    together: Together,
+    claiming: Claiming,
+    stepping: Stepping,
     shut: Mutex<Vec<String>>,
     shares: Mutex<Shares>,
     /// Of the words that wake idle daemons.
@@ -125,9 +130,9 @@ impl PostgresStore {
     }
 
     fn over(open::Begun { runtime, end, database, life, claims, channel }: open::Begun) -> Self {
-        let (together, calls) = (Together::default(), AtomicI64::new(1));
+        let (claiming, stepping, calls) = (Together::new(CLAIMS_AT_ONCE), Together::new(STEPS_AT_ONCE), AtomicI64::new(1));
         let (shut, shares, looked) = (Mutex::default(), Mutex::default(), Mutex::default());
-        Self { runtime: Some(runtime), end, database, life, claims, together, shut, shares, channel, calls, looked }
+        Self { runtime: Some(runtime), end, database, life, claims, claiming, stepping, shut, shares, channel, calls, looked }
     }
 
     /// Makes the store, or brings it up to date, and begins nothing: for the owner of its schema.
@@ -159,7 +164,7 @@ impl PostgresStore {
     }
 
     fn way<'a>(&'a self, tried: &'a Mutex<Tried>) -> Way<'a> {
-        Way { together: &self.together, clock: &*self.life.machine, tried }
+        Way { stepping: &self.stepping, clock: &*self.life.machine, tried }
     }
 
     fn served(&self) -> Option<&[String]> {
@@ -193,10 +198,10 @@ impl PostgresStore {
     }
 
     fn next(&self, want: &Filter) -> Result<Option<Claim>, StoreError> {
-        let (folders, call, tries) = (self.folders(), self.calls.fetch_add(1, Ordering::Relaxed), AtomicU32::new(0));
+        let (ask, tries) = (Ask { want: *want, call: self.calls.fetch_add(1, Ordering::Relaxed) }, AtomicU32::new(0));
         let found = self.ask(async |connection| {
             let again = tries.fetch_add(1, Ordering::Relaxed) > 0;
-            claim::claim(connection, &self.life, want, &folders, call, again).await
+            claim::claim(connection, &self.life, &self.claiming, ask, || self.folders(), again).await
         })?;
         Ok(found.map(|(claim, seen)| {
             self.claims.keep(&claim, seen);

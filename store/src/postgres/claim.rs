@@ -1,16 +1,18 @@
 //! Claims: one statement each, work outside of any transaction. Their leases are counted by the database's clock; what is left of a daemon that
 //! let them run out is taken back by whoever claims next.
 
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-use sqlx::postgres::PgConnection;
+use sqlx::postgres::{PgConnection, PgRow};
 use sqlx::{Connection, Row};
 
 use super::database::Failure;
 use super::row::{Stored, int, number};
 use super::step::Seen;
+use super::together::Together;
 use super::turns::{Folders, alone};
 use super::write::{By, Write, one};
 use crate::host::Station;
@@ -63,52 +65,129 @@ pub(super) async fn check(connection: &mut PgConnection, life: &Life) -> Result<
     row.map(|_| ()).ok_or_else(|| life.over().into())
 }
 
-/// As [`crate::JobStore::claim`], with the row as it is then. `call` names it among all of this life, so that a try whose answer was lost is found again.
+/// A claim that is wanted. `call` names it among all of this life, so that a try whose answer was lost is found again.
+#[derive(Clone, Copy)]
+pub(super) struct Ask {
+    pub(super) want: Filter,
+    pub(super) call: i64,
+}
+
+/// What became of it.
+pub(super) enum Found {
+    /// The row as it is then.
+    Claimed(Box<Seen>),
+    Nothing,
+    /// There is something, but others are about to take it.
+    Contended,
+    /// The life is over.
+    Over,
+}
+
+/// Claims that are asked for at the same time. A row that cannot be read is the matter of whoever claimed it.
+pub(super) type Claiming = Together<Ask, Result<Found, Failure>>;
+
+/// As [`crate::JobStore::claim`], with the row as it is then. `folders` says how folders share the work, whenever it is asked; `again`: an earlier try may
+/// have been answered.
 pub(super) async fn claim(
     connection: &mut PgConnection,
     life: &Life,
-    want: &Filter,
-    folders: &Folders,
-    call: i64,
-    again: bool,
+    claiming: &Claiming,
+    ask: Ask,
+    folders: impl Fn() -> Folders,
+    mut again: bool,
 ) -> Result<Option<(Claim, Option<Seen>)>, Failure> {
-    if again && let Some(claim) = made(connection, life, call).await? {
-        return Ok(Some((claim, None)));
-    }
     for round in 0..ROUNDS {
-        let query = sqlx::query(CLAIM)
-            .bind(int(life.epoch.0))
-            .bind(life.machine.boot().0.cast_signed())
-            .bind(call)
-            .bind(life.lease)
-            .bind(int(want.size.0))
-            .bind(int(want.size.1))
-            .bind(want.alone)
-            .bind(&folders.shut)
-            .bind(&life.folders);
-        let query = folders.bind(query);
-        let row = if folders.has_limits() {
-            let mut transaction = connection.begin().await?;
-            alone(&mut transaction).await?;
-            let row = query.fetch_one(&mut *transaction).await?;
-            transaction.commit().await?;
-            row
-        } else {
-            query.fetch_one(&mut *connection).await?
-        };
-        if row.try_get::<Option<i64>, _>("id")?.is_some() {
-            let seen = Seen::new(Stored::read(&row)?, Time(number(row.try_get("now")?)), &*life.machine);
-            return Ok(Some((claim_of(&seen.stored)?, Some(seen))));
+        if std::mem::take(&mut again)
+            && let Some(claim) = made(connection, life, ask.call).await?
+        {
+            return Ok(Some((claim, None)));
         }
-        if !row.try_get::<bool, _>("is_alive")? {
-            return Err(life.over().into());
+        let all = async |connection: &mut PgConnection, asks: &[Ask]| claims(connection, life, asks, &folders()).await;
+        match claiming.ask(connection, ask, all).await?.transpose()? {
+            Some(Found::Claimed(seen)) => return Ok(Some((claim_of(&seen.stored)?, Some(*seen)))),
+            Some(Found::Nothing) => return Ok(None),
+            Some(Found::Over) => return Err(life.over().into()),
+            Some(Found::Contended) => tokio::time::sleep(ROUND * round).await,
+            None => again = true,
         }
-        if row.try_get::<i64, _>("candidates")? == 0 || row.try_get("is_draining")? {
-            return Ok(None);
-        }
-        tokio::time::sleep(ROUND * round).await;
     }
     Ok(None)
+}
+
+/// Claims, as many as are asked for; those that want the same in one statement.
+pub(super) async fn claims(
+    connection: &mut PgConnection,
+    life: &Life,
+    asks: &[Ask],
+    folders: &Folders,
+) -> Result<Vec<Result<Found, Failure>>, Failure> {
+    let mut found = BTreeMap::new();
+    let mut left: Vec<Ask> = asks.to_vec();
+    while let Some(first) = left.first().copied() {
+        let (now, later): (Vec<Ask>, Vec<Ask>) = left.into_iter().partition(|ask| ask.want == first.want);
+        let calls: Vec<i64> = now.iter().map(|ask| ask.call).collect();
+        alike(connection, life, first.want, &calls, folders, &mut found).await?;
+        left = later;
+    }
+    Ok(asks.iter().map(|ask| found.remove(&ask.call).unwrap_or(Ok(Found::Contended))).collect())
+}
+
+/// Claims of one want, for calls of these numbers.
+async fn alike(
+    connection: &mut PgConnection,
+    life: &Life,
+    want: Filter,
+    calls: &[i64],
+    folders: &Folders,
+    found: &mut BTreeMap<i64, Result<Found, Failure>>,
+) -> Result<(), Failure> {
+    let query = sqlx::query(CLAIM)
+        .bind(int(life.epoch.0))
+        .bind(life.machine.boot().0.cast_signed())
+        .bind(calls)
+        .bind(life.lease)
+        .bind(int(want.size.0))
+        .bind(int(want.size.1))
+        .bind(want.alone)
+        .bind(&folders.shut)
+        .bind(&life.folders);
+    let query = folders.bind(query);
+    let rows = if folders.has_limits() {
+        let mut transaction = connection.begin().await?;
+        alone(&mut transaction).await?;
+        let rows = query.fetch_all(&mut *transaction).await?;
+        transaction.commit().await?;
+        rows
+    } else {
+        query.fetch_all(&mut *connection).await?
+    };
+    for row in rows {
+        if let Some(call) = row.try_get::<Option<i64>, _>("call")? {
+            found.insert(call, seen(&row, life).map(|seen| Found::Claimed(Box::new(seen))));
+            continue;
+        }
+        // The last: what is to be said to all others.
+        for call in calls {
+            let (is_alive, is_draining, is_contended) =
+                (row.try_get("is_alive")?, row.try_get("is_draining")?, row.try_get("is_contended")?);
+            found.entry(*call).or_insert_with(|| Ok(Found::of_none(is_alive, is_draining, is_contended)));
+        }
+    }
+    Ok(())
+}
+
+impl Found {
+    fn of_none(is_alive: bool, is_draining: bool, is_contended: bool) -> Self {
+        match (is_alive, is_draining, is_contended) {
+            (false, ..) => Self::Over,
+            (true, false, true) => Self::Contended,
+            _ => Self::Nothing,
+        }
+    }
+}
+
+fn seen(row: &PgRow, life: &Life) -> Result<Seen, Failure> {
+    Ok(Seen::new(Stored::read(row)?, Time(number(row.try_get("now")?)), &*life.machine))
 }
 
 /// The claim that an earlier try of the same call made.

@@ -19,6 +19,15 @@ fn names(kinds: &[Kind]) -> Vec<&'static str> {
     kinds.iter().map(|kind| kind.name()).collect()
 }
 
+/// The words that the column `kind` may have for them.
+fn kept(kinds: &[Kind]) -> Vec<&'static str> {
+    let mut names = names(kinds);
+    if kinds.iter().any(|kind| kind.is_held()) {
+        names.push(Kind::Running.name());
+    }
+    names
+}
+
 fn limit(most: usize) -> i64 {
     i64::try_from(most).unwrap_or(i64::MAX)
 }
@@ -37,8 +46,13 @@ type Served<'a> = Option<&'a [String]>;
 pub(super) async fn list(connection: &mut PgConnection, served: Served<'_>, query: &Query) -> Result<Vec<Job>, Failure> {
     let most = if query.limit == 0 { usize::MAX } else { query.limit };
     let sql = "SELECT id, seq, record, epoch, token, claim_token, claim_boot, claim_at FROM jobs
-        WHERE id > $1 AND kind = ANY ($2) AND ($4::text[] IS NULL OR folder = ANY ($4)) ORDER BY id LIMIT $3";
-    let rows = sqlx::query(sql).bind(int(query.after.0)).bind(names(&query.kinds)).bind(limit(most)).bind(served);
+        WHERE id > $1 AND kind = ANY ($2) AND coalesce(stage, kind) = ANY ($5) AND ($4::text[] IS NULL OR folder = ANY ($4)) ORDER BY id LIMIT $3";
+    let rows = sqlx::query(sql)
+        .bind(int(query.after.0))
+        .bind(kept(&query.kinds))
+        .bind(limit(most))
+        .bind(served)
+        .bind(names(&query.kinds));
     jobs(&rows.fetch_all(connection).await?)
 }
 
@@ -50,17 +64,19 @@ pub(super) async fn page(connection: &mut PgConnection, served: Served<'_>, look
     }
     let most = if look.folder.is_some() || served.is_some() { PAGE_READS } else { look.limit.min(PAGE_READS) };
     let sql = "WITH seen AS MATERIALIZED (
-            SELECT id, ($3::text IS NULL OR folder = $3) AND ($6::text[] IS NULL OR folder = ANY ($6)) AS fits FROM jobs WHERE id < $1 AND kind = ANY ($2) ORDER BY id DESC LIMIT $4
+            SELECT id, ($3::text IS NULL OR folder = $3) AND ($6::text[] IS NULL OR folder = ANY ($6)) AS fits FROM jobs WHERE id < $1 AND kind = ANY ($2) AND coalesce(stage, kind) = ANY ($7)
+            ORDER BY id DESC LIMIT $4
         ), wanted AS MATERIALIZED (SELECT id FROM seen WHERE fits ORDER BY id DESC LIMIT $5)
         SELECT s.id AS number, j.id, j.seq, j.record, j.epoch, j.token, j.claim_token, j.claim_boot, j.claim_at
         FROM seen s LEFT JOIN wanted w ON w.id = s.id LEFT JOIN jobs j ON j.id = w.id ORDER BY s.id DESC";
     let rows = sqlx::query(sql)
         .bind(look.before.map_or(i64::MAX, |before| int(before.0)))
-        .bind(names(&look.kinds))
+        .bind(kept(&look.kinds))
         .bind(&look.folder)
         .bind(limit(most))
         .bind(limit(look.limit))
         .bind(served)
+        .bind(names(&look.kinds))
         .fetch_all(connection)
         .await?;
     for (read, row) in rows.iter().enumerate() {
@@ -102,7 +118,7 @@ pub(super) async fn results(
 
 /// As [`crate::JobStore::counts`].
 pub(super) async fn counts(connection: &mut PgConnection, served: Served<'_>) -> Result<Vec<(Kind, u64)>, Failure> {
-    let sql = "SELECT kind, count(*) AS count FROM jobs WHERE $1::text[] IS NULL OR folder = ANY ($1) GROUP BY kind";
+    let sql = "SELECT coalesce(stage, kind) AS kind, count(*) AS count FROM jobs WHERE $1::text[] IS NULL OR folder = ANY ($1) GROUP BY 1";
     let rows = sqlx::query(sql).bind(served).fetch_all(connection).await?;
     let mut counts = Kind::ALL.map(|kind| (kind, 0)).to_vec();
     for row in rows {

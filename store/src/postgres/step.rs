@@ -14,7 +14,7 @@ use sqlx::postgres::PgConnection;
 use super::database::Failure;
 use super::row::{Stored, int, number};
 use super::together::Together;
-use super::write::{By, Write, one};
+use super::write::{By, Write, Written, all, one};
 use crate::id::{Clock, JobId, Time};
 use crate::job::{Event, Illegal, Job};
 use crate::store::StoreError;
@@ -58,10 +58,13 @@ impl Tried {
     }
 }
 
+/// Steps that are made at the same time.
+pub(super) type Stepping = Together<Write, Written>;
+
 /// How transitions are made.
 #[derive(Clone, Copy)]
 pub(super) struct Way<'a> {
-    pub(super) together: &'a Together,
+    pub(super) stepping: &'a Stepping,
     /// Only counts milliseconds.
     pub(super) clock: &'a dyn Clock,
     /// From one try of the call to the next.
@@ -106,8 +109,14 @@ pub(super) async fn transition(
         let write = Write::new(&stored, &after, by, counted)?;
         let record = write.columns.record.clone();
         tried().records.push(record.clone());
-        let written =
-            if counted.is_some() { way.together.write(connection, write).await? } else { Some(one(connection, &write).await?) };
+        // Only holders know a row.
+        let written = if counted.is_some() {
+            way.stepping
+                .ask(connection, write, async |connection: &mut PgConnection, writes: &[Write]| all(connection, writes).await)
+                .await?
+        } else {
+            Some(one(connection, &write).await?)
+        };
         match written {
             Some(Some((seq, at))) => {
                 let (epoch, token) = (stored.epoch, stored.token);

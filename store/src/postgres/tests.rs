@@ -9,6 +9,7 @@ use super::*;
 use crate::id::Clock;
 use crate::testkit::{Subject, conformance};
 
+mod claims;
 mod farm;
 mod figures;
 mod hosts;
@@ -20,6 +21,7 @@ mod served;
 mod server;
 mod steps;
 mod transfer;
+mod version_2;
 
 use server::{Schemas, Server, server};
 

@@ -135,7 +135,7 @@ async fn put_notices(transaction: &mut PgTransaction<'_>, life: &Life, notices: 
 
 /// A line for each row that is damaged, or whose columns say something else than its record.
 pub(super) async fn verify(connection: &mut PgConnection) -> Result<Vec<String>, Failure> {
-    let sql = "SELECT id, seq, record, epoch, token, claim_token, claim_boot, claim_at, kind, folder, size, priority, since, not_before, alone,
+    let sql = "SELECT id, seq, record, epoch, token, claim_token, claim_boot, claim_at, coalesce(stage, kind) AS kind, folder, size, priority, since, not_before, alone,
         cancel, file_key, recipe, id > (SELECT last_job FROM head) OR seq > (SELECT last_value FROM transitions) AS is_ahead
         FROM jobs ORDER BY id";
     let mut wrong = Vec::new();

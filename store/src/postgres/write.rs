@@ -1,7 +1,8 @@
 //! Rows as they are to be written: compare and set, any number of them in one statement.
 
-use sqlx::Row;
-use sqlx::postgres::{PgConnection, PgRow};
+use sqlx::postgres::{PgArguments, PgConnection, PgRow};
+use sqlx::query::Query;
+use sqlx::{Postgres, Row};
 
 use super::database::Failure;
 use super::outbox;
@@ -11,10 +12,13 @@ use crate::job::{Job, State};
 use crate::record;
 use crate::store::StoreError;
 
-const WRITE: &str = include_str!("sql/write.sql");
-/// The same of one row, at less cost. $18 as there.
-const WRITE_ONE: &str = "SELECT CASE WHEN $18::bigint IS NULL OR abs(suture_now() - $18) <= 1000
-    THEN suture_write($1, $2, $3, $4, $5, $6, $7, $8, $9, $10, $11, $12, $13, $14, $15, $16, $17) END AS seq, suture_now() AS now";
+/// One row, whoever writes it.
+const WRITE: &str = "SELECT CASE WHEN $17::bigint IS NULL OR abs(suture_now() - $17) <= 1000
+    THEN suture_write($1, $2, $3, $4, $5, $6, $7, $8, $9, $10, $11, $12, $13, $14, $15, $16, $18) END AS seq, suture_now() AS now";
+/// The same of a holder's step that does not end the job, at less cost.
+const STEP: &str = include_str!("sql/step.sql");
+/// Steps of holders, any number of them.
+const STEPS: &str = include_str!("sql/steps.sql");
 
 /// Who may write.
 #[derive(Clone, Copy)]
@@ -75,8 +79,18 @@ impl Write {
 
 /// Writes one.
 pub(super) async fn one(connection: &mut PgConnection, write: &Write) -> Result<Written, Failure> {
+    let row = if write.needed.is_some() && write.ended.is_none() {
+        bind(sqlx::query(STEP), write).fetch_optional(connection).await?
+    } else {
+        bind(sqlx::query(WRITE), write).bind(&write.ended).fetch_optional(connection).await?
+    };
+    row.map_or(Ok(None), |row| written(&row))
+}
+
+/// Binds $1 to $17 of a statement about one row.
+fn bind<'q>(query: Query<'q, Postgres, PgArguments>, write: &'q Write) -> Query<'q, Postgres, PgArguments> {
     let Write { columns, .. } = write;
-    let row = sqlx::query(WRITE_ONE)
+    query
         .bind(columns.id)
         .bind(write.seq)
         .bind(write.needed)
@@ -93,9 +107,7 @@ pub(super) async fn one(connection: &mut PgConnection, write: &Write) -> Result<
         .bind(write.token)
         .bind(write.lease)
         .bind(columns.is_fresh)
-        .bind(&write.ended)
-        .bind(write.counted);
-    written(&row.fetch_one(connection).await?)
+        .bind(write.counted)
 }
 
 fn written(row: &PgRow) -> Result<Written, Failure> {
@@ -103,15 +115,32 @@ fn written(row: &PgRow) -> Result<Written, Failure> {
     Ok(seq.map(|seq| (Seq(number(seq)), Time(number(now)))))
 }
 
-/// Writes them, each for itself, in one transaction. They are in the order of their jobs, so that two such calls never wait for each other in a circle.
+/// Writes steps of holders, each for itself, in one statement. They go in the order of their jobs, so that two such calls never wait for each other in a circle.
 pub(super) async fn all(connection: &mut PgConnection, writes: &[Write]) -> Result<Vec<Written>, Failure> {
-    fn each<'a, T>(writes: &'a [Write], part: impl Fn(&'a Write) -> T) -> Vec<T> {
-        writes.iter().map(part).collect()
-    }
     if let [write] = writes {
         return Ok(vec![one(connection, write).await?]);
     }
-    let rows = sqlx::query(WRITE)
+    let mut order: Vec<usize> = (0..writes.len()).collect();
+    order.sort_by_key(|at| writes.get(*at).map(|write| write.columns.id));
+    let sorted: Vec<&Write> = order.iter().filter_map(|at| writes.get(*at)).collect();
+    let rows = steps(connection, &sorted).await?;
+    let mut all = vec![None; writes.len()];
+    for row in rows {
+        let place = usize::try_from(row.try_get::<i64, _>("place")?).unwrap_or_default();
+        let at = place.checked_sub(1).and_then(|place| order.get(place));
+        if let Some(one) = at.and_then(|at| all.get_mut(*at)) {
+            *one = written(&row)?;
+        }
+    }
+    Ok(all)
+}
+
+/// Those that were made, by their places from 1 on.
+async fn steps(connection: &mut PgConnection, writes: &[&Write]) -> Result<Vec<PgRow>, Failure> {
+    fn each<'a, T>(writes: &[&'a Write], part: impl Fn(&'a Write) -> T) -> Vec<T> {
+        writes.iter().map(|write| part(write)).collect()
+    }
+    let rows = sqlx::query(STEPS)
         .bind(each(writes, |write| write.columns.id))
         .bind(each(writes, |write| write.seq))
         .bind(each(writes, |write| write.needed))
@@ -129,8 +158,6 @@ pub(super) async fn all(connection: &mut PgConnection, writes: &[Write]) -> Resu
         .bind(each(writes, |write| write.lease))
         .bind(each(writes, |write| write.columns.is_fresh))
         .bind(each(writes, |write| write.ended.as_deref()))
-        .bind(each(writes, |write| write.counted))
-        .fetch_all(connection)
-        .await?;
-    rows.iter().map(written).collect()
+        .bind(each(writes, |write| write.counted));
+    Ok(rows.fetch_all(connection).await?)
 }

@@ -5,6 +5,7 @@ use std::num::NonZeroU32;
 use super::*;
 use crate::job::{AGEING_MS, Priority};
 use crate::memory::MemoryStore;
+use crate::postgres::claim::{Found, claims};
 use crate::share::{Share, Weight};
 use crate::testkit::{ManualClock, dropped};
 
@@ -28,6 +29,19 @@ type Seen = Result<(Kind, Option<Time>, crate::job::Blame, crate::id::Attempt), 
 fn step(store: &dyn JobStore, claim: &Claim, step: &Step) -> Seen {
     let after = store.advance(claim, step.clone()).map_err(|error| error.to_string())?;
     Ok((after.kind(), after.pause(), after.blame, after.attempts))
+}
+
+/// What calls of these numbers are given by one statement.
+fn at_once(store: &PostgresStore, want: Filter, calls: std::ops::Range<i64>) -> Vec<Claim> {
+    let asks: Vec<Ask> = calls.map(|call| Ask { want, call }).collect();
+    let folders = store.folders();
+    let found = store.ask(async |connection| claims(connection, &store.life, &asks, &folders).await).unwrap();
+    let claim = |found| {
+        let Ok(Found::Claimed(seen)) = found else { return None };
+        let stored = seen.stored;
+        Some(Claim { id: stored.job.id, token: stored.token?, job: stored.job })
+    };
+    found.into_iter().filter_map(claim).collect()
 }
 
 #[test]
@@ -65,16 +79,21 @@ fn the_statement_and_the_model_agree_on_who_is_next() {
             if numbers.below(3) == 0 {
                 continue;
             }
-            let [expected, claim] = stores.map(|store| store.claim(&want).unwrap());
-            assert_eq!(claim.as_ref().map(|claim| claim.id), expected.as_ref().map(|claim| claim.id), "seed {seed}, step {at}");
-            let (Some(expected), Some(claim)) = (expected, claim) else { continue };
-            claimed += 1;
-            // Some come back after a pause, some at once, some never. None stays in work: leases run out.
-            let what = [Step::Environment { reason: "full".into() }, Step::HandBack, Step::NeedsAll, Step::Cancelled]
-                [usize::try_from(numbers.below(4)).unwrap()]
-            .clone();
-            let [expected, after] = [step(&model, &expected, &what), step(&store, &claim, &what)];
-            assert_eq!(after, expected, "seed {seed}, step {at}");
+            // Several that are asked for at once are given as if they were asked for one after the other.
+            let count = i64::try_from(1 + numbers.below(3)).unwrap();
+            let expected: Vec<_> = (0..count).filter_map(|_| model.claim(&want).unwrap()).collect();
+            let given = at_once(&store, want, i64::from(at) * 10..i64::from(at) * 10 + count);
+            let ids = |claims: &[Claim]| claims.iter().map(|claim| claim.id).collect::<Vec<_>>();
+            assert_eq!(ids(&given), ids(&expected), "seed {seed}, step {at}");
+            for (expected, claim) in expected.iter().zip(&given) {
+                claimed += 1;
+                // Some come back after a pause, some at once, some never. None stays in work: leases run out.
+                let what = [Step::Environment { reason: "full".into() }, Step::HandBack, Step::NeedsAll, Step::Cancelled]
+                    [usize::try_from(numbers.below(4)).unwrap()]
+                .clone();
+                let [expected, after] = [step(&model, expected, &what), step(&store, claim, &what)];
+                assert_eq!(after, expected, "seed {seed}, step {at}");
+            }
         }
         assert!(claimed > 30, "seed {seed}: {claimed}");
     }

@@ -21,7 +21,7 @@ fn eight_that_begin_at_once_make_one_schema() {
     for store in opened {
         store.unwrap().check().unwrap();
     }
-    sql(&shared, "DO $$ BEGIN ASSERT (SELECT count(*) FROM migrations) = 2 AND (SELECT count(*) FROM lives) = 8; END $$")
+    sql(&shared, "DO $$ BEGIN ASSERT (SELECT count(*) FROM migrations) = 3 AND (SELECT count(*) FROM lives) = 8; END $$")
         .unwrap();
 }
 
@@ -30,11 +30,11 @@ fn a_newer_schema_is_refused_and_so_is_one_of_another_make() {
     let Some(server) = server() else { return };
     let shared = server.schema("daemon");
     drop(PostgresStore::open(&shared).unwrap());
-    sql(&shared, "INSERT INTO migrations (version, digest) VALUES (3, ''), (4, '')").unwrap();
+    sql(&shared, "INSERT INTO migrations (version, digest) VALUES (4, ''), (5, '')").unwrap();
     let error = PostgresStore::open(&shared).err().unwrap();
-    assert!(matches!(error, StoreError::Newer { found: 4, known: 2 }), "{error:?}");
-    assert_eq!(error.to_string(), "the job database has version 4; this program knows versions up to 2");
-    sql(&shared, "DELETE FROM migrations WHERE version > 2; UPDATE migrations SET digest = 'x'").unwrap();
+    assert!(matches!(error, StoreError::Newer { found: 5, known: 3 }), "{error:?}");
+    assert_eq!(error.to_string(), "the job database has version 5; this program knows versions up to 3");
+    sql(&shared, "DELETE FROM migrations WHERE version > 3; UPDATE migrations SET digest = 'x'").unwrap();
     let error = PostgresStore::open(&shared).err().unwrap();
     assert!(matches!(error, StoreError::Unusable { .. }) && error.to_string().contains("its version 1"), "{error}");
 }

@@ -89,3 +89,37 @@ fn each_caller_hears_of_his_own_job() {
     });
     assert_eq!(store.counts().unwrap().into_iter().find(|(kind, _)| *kind == Kind::Done).unwrap().1, 16 * EACH as u64);
 }
+
+/// So that a step of a holder writes the row alone, and no index.
+#[test]
+fn a_step_of_a_holder_leaves_what_indexes_look_at() {
+    let Some(server) = server() else { return };
+    let shared = server.schema("daemon");
+    let store = PostgresStore::open(&shared).unwrap();
+    store.submit(&files(2)).unwrap();
+    let claims = [(), ()].map(|()| store.claim(&Filter::default()).unwrap().unwrap());
+    // All columns that an index of the table has, in its expressions and its condition, too.
+    let looked_at = "CREATE TABLE looked_at AS SELECT DISTINCT a.attname::text AS name FROM pg_index i
+            JOIN pg_depend d ON d.classid = 'pg_class'::regclass AND d.objid = i.indexrelid AND d.refobjid = i.indrelid
+            JOIN pg_attribute a ON a.attrelid = i.indrelid AND a.attnum = d.refobjsubid WHERE i.indrelid = 'jobs'::regclass;
+        CREATE VIEW seen_by_indexes AS SELECT id, (SELECT jsonb_object_agg(key, value) FROM jsonb_each(to_jsonb(j)) WHERE key IN (SELECT name FROM looked_at)) AS seen
+            FROM jobs j;
+        CREATE TABLE before AS SELECT * FROM seen_by_indexes;
+        DO $$ BEGIN ASSERT (SELECT array_agg(name) @> '{kind,epoch,folder,since,alone,size}' FROM looked_at); END $$";
+    sql(&shared, looked_at).unwrap();
+    let publication = |claim: &Claim| Step::Intend(result_of(&claim.job, Ending::Clean));
+    // One by itself, and two together.
+    store.advance(&claims[0], publication(&claims[0])).unwrap();
+    let seen = claims.each_ref().map(|claim| store.claims.seen(claim).unwrap());
+    let steps = [Step::Placed, publication(&claims[1])];
+    let writes: Vec<_> = (claims.iter().zip(&seen).zip(steps))
+        .map(|((claim, seen), step)| {
+            let after = seen.stored.job.after(&Event::Step { token: claim.token, step }, Time(5)).unwrap();
+            Write::new(&seen.stored, &after, By::Holder { token: claim.token, lease: 1000 }, None).unwrap()
+        })
+        .collect();
+    let written = store.ask(async |connection| all(connection, &writes).await).unwrap();
+    assert!(written.iter().all(Option::is_some));
+    sql(&shared, "DO $$ BEGIN ASSERT NOT EXISTS (SELECT * FROM before EXCEPT SELECT * FROM seen_by_indexes); END $$").unwrap();
+    assert_eq!(claims.each_ref().map(|claim| store.get(claim.id).unwrap().unwrap().kind()), [Kind::Published, Kind::Publishing]);
+}

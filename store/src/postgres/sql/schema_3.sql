@@ -124,7 +124,7 @@ CREATE FUNCTION suture_claims(
 DECLARE
     time_now CONSTANT bigint := suture_now();
     has_limits CONSTANT boolean := array_length(array_remove(limits, NULL), 1) IS NOT NULL;
-    has_rested boolean := false;
+    has_rested boolean;
     lives_on boolean;
     drains boolean;
     others_take boolean := false;
@@ -132,7 +132,9 @@ DECLARE
     open_now text[];
     classes integer[] := '{}';
     bases smallint[] := '{}';
-    base smallint;
+    least_class CONSTANT integer := suture_class(is_alone, least_size);
+    class integer := suture_class(is_alone, most_size);
+    base smallint := 10;
     given integer := 0;
     this bigint;
     picked bigint;
@@ -140,14 +142,13 @@ DECLARE
     transition bigint;
     head record;
 BEGIN
-    SELECT NOT l.is_over, EXISTS (SELECT 1 FROM drains d WHERE d.name IN (l.daemon, l.host)) INTO lives_on, drains
-    FROM lives l WHERE l.epoch = of_epoch;
+    SELECT NOT l.is_over, EXISTS (SELECT 1 FROM drains d WHERE d.name IN (l.daemon, l.host)), EXISTS (SELECT 1 FROM jobs WHERE not_before IS NOT NULL)
+    INTO lives_on, drains, has_rested FROM lives l WHERE l.epoch = of_epoch;
     IF lives_on IS NOT TRUE OR drains THEN
         RETURN QUERY SELECT NULL::bigint, NULL::bigint, NULL::bigint, NULL::bytea, time_now, lives_on IS TRUE, drains IS TRUE, false;
         RETURN;
     END IF;
-    -- Mostly there is no pause at all, so that there is only one look.
-    IF EXISTS (SELECT 1 FROM jobs WHERE not_before IS NOT NULL) THEN
+    IF has_rested THEN
         has_rested := EXISTS (SELECT 1 FROM suture_rested(time_now, 'waiting', shut, served))
             OR EXISTS (SELECT 1 FROM suture_rested(time_now, 'parked', shut, served));
     END IF;
@@ -158,17 +159,15 @@ BEGIN
     ELSE
         known := served;
     END IF;
-    -- All priorities that there are; each time the highest that is left, for the same reason as in `suture_folders`.
-    FOR class IN suture_class(is_alone, least_size) .. suture_class(is_alone, most_size) LOOP
-        base := 10;
-        LOOP
-            SELECT j.priority INTO base FROM jobs j
-            WHERE j.kind IN ('queued', 'queued_alone') AND suture_class(j.alone, j.size) = class AND j.priority < base
-            ORDER BY j.priority DESC LIMIT 1;
-            EXIT WHEN NOT FOUND;
-            classes := classes || class;
-            bases := bases || base;
-        END LOOP;
+    -- All classes and priorities that there are; each time the highest that is left, for the same reason as in `suture_folders`.
+    LOOP
+        SELECT suture_class(j.alone, j.size), j.priority INTO class, base FROM jobs j
+        WHERE j.kind IN ('queued', 'queued_alone') AND suture_class(j.alone, j.size) >= least_class
+            AND (suture_class(j.alone, j.size), j.priority) < (class, base)
+        ORDER BY suture_class(j.alone, j.size) DESC, j.priority DESC LIMIT 1;
+        EXIT WHEN NOT FOUND;
+        classes := classes || class;
+        bases := bases || base;
     END LOOP;
     FOREACH this IN ARRAY calls LOOP
         picked := NULL;

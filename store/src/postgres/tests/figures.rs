@@ -72,7 +72,9 @@ fn claims_and_completions_per_second() {
     eprintln!("load before: {}", std::fs::read_to_string("/proc/loadavg").unwrap_or_default().trim());
     let runs = [(1, 1, JOBS), (1, 16, JOBS), (1, 64, JOBS), (16, 1, JOBS), (64, 1, JOBS), (1, 16, 100_000)];
     for (daemons, connections, waiting) in runs {
-        let shared = Shared { connections, ..server.schema("daemon") };
+        // As a daemon opens it.
+        let (folders, joint) = (Some(vec!["hot".to_owned()]), ["hot".to_owned()].into());
+        let shared = Shared { connections, folders, joint, ..server.schema("daemon") };
         let open = |at: u32| PostgresStore::open(&other(&shared, &at.to_string())).unwrap();
         let stores: Vec<_> = (0..daemons).map(open).collect();
         let began = Instant::now();

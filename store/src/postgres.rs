@@ -2,7 +2,7 @@
 //!
 //! | what                | how                                                                                                       |
 //! |---------------------|-----------------------------------------------------------------------------------------------------------|
-//! | a claim             | one statement (`sql/claim.sql`), rows that others are about to take skipped                               |
+//! | a claim             | one call (`sql/claim.sql`), rows that others are about to take skipped                                    |
 //! | a step              | the row is read, judged by the state machine, and set if it is still the one that was read                |
 //! | who may step        | the holder of the row's token; a new claim, and the end of the holder's life, takes it from him           |
 //! | time                | the database's clock; what a machine says of itself is only which start of it this is                     |
@@ -77,8 +77,8 @@ use turns::Folders;
 use write::By;
 
 /// So many statements of claims and of steps are under way at a time; what comes meanwhile goes with the next.
-const CLAIMS_AT_ONCE: usize = 2;
-const STEPS_AT_ONCE: usize = 4;
+const CLAIMS_AT_ONCE: usize = 4;
+const STEPS_AT_ONCE: usize = 12;
 
 /// The shared [`JobStore`].
 pub struct PostgresStore {

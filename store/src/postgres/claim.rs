@@ -1,4 +1,4 @@
-//! Claims: one statement each, work outside of any transaction. Their leases are counted by the database's clock; what is left of a daemon that
+//! Claims: one statement for all that are asked for at a time, work outside of any transaction. Their leases are counted by the database's clock; what is left of a daemon that
 //! let them run out is taken back by whoever claims next.
 
 use std::collections::BTreeMap;

@@ -19,7 +19,7 @@ fn names(kinds: &[Kind]) -> Vec<&'static str> {
     kinds.iter().map(|kind| kind.name()).collect()
 }
 
-/// The words that the column `kind` may have for them.
+/// The words that the column `kind` may have for them; `stage` says more of those that are held.
 fn kept(kinds: &[Kind]) -> Vec<&'static str> {
     let mut names = names(kinds);
     if kinds.iter().any(|kind| kind.is_held()) {
@@ -46,7 +46,8 @@ type Served<'a> = Option<&'a [String]>;
 pub(super) async fn list(connection: &mut PgConnection, served: Served<'_>, query: &Query) -> Result<Vec<Job>, Failure> {
     let most = if query.limit == 0 { usize::MAX } else { query.limit };
     let sql = "SELECT id, seq, record, epoch, token, claim_token, claim_boot, claim_at FROM jobs
-        WHERE id > $1 AND kind = ANY ($2) AND coalesce(stage, kind) = ANY ($5) AND ($4::text[] IS NULL OR folder = ANY ($4)) ORDER BY id LIMIT $3";
+        WHERE id > $1 AND kind = ANY ($2) AND coalesce(stage, kind) = ANY ($5) AND ($4::text[] IS NULL OR folder = ANY ($4))
+        ORDER BY id LIMIT $3";
     let rows = sqlx::query(sql)
         .bind(int(query.after.0))
         .bind(kept(&query.kinds))
@@ -64,8 +65,8 @@ pub(super) async fn page(connection: &mut PgConnection, served: Served<'_>, look
     }
     let most = if look.folder.is_some() || served.is_some() { PAGE_READS } else { look.limit.min(PAGE_READS) };
     let sql = "WITH seen AS MATERIALIZED (
-            SELECT id, ($3::text IS NULL OR folder = $3) AND ($6::text[] IS NULL OR folder = ANY ($6)) AS fits FROM jobs WHERE id < $1 AND kind = ANY ($2) AND coalesce(stage, kind) = ANY ($7)
-            ORDER BY id DESC LIMIT $4
+            SELECT id, ($3::text IS NULL OR folder = $3) AND ($6::text[] IS NULL OR folder = ANY ($6)) AS fits
+            FROM jobs WHERE id < $1 AND kind = ANY ($2) AND coalesce(stage, kind) = ANY ($7) ORDER BY id DESC LIMIT $4
         ), wanted AS MATERIALIZED (SELECT id FROM seen WHERE fits ORDER BY id DESC LIMIT $5)
         SELECT s.id AS number, j.id, j.seq, j.record, j.epoch, j.token, j.claim_token, j.claim_boot, j.claim_at
         FROM seen s LEFT JOIN wanted w ON w.id = s.id LEFT JOIN jobs j ON j.id = w.id ORDER BY s.id DESC";

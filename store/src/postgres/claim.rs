@@ -1,5 +1,5 @@
-//! Claims: one statement for all that are asked for at a time, work outside of any transaction. Their leases are counted by the database's clock; what is left of a daemon that
-//! let them run out is taken back by whoever claims next.
+//! Claims: one statement for all that are asked for at a time, work outside of any transaction. Their leases are counted by the database's clock; what is
+//! left of a daemon that let them run out is taken back by whoever claims next.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;

@@ -43,11 +43,10 @@ mod request;
 mod staff;
 mod worked;
 
-use conclude::Onward;
 pub(crate) use request::{IN_HAND, WITNESS};
 use request::{limits, request};
 use staff::Staff;
-use worked::Worked;
+use worked::{Onward, Worked};
 
 /// How often a running job asks whether anyone wants it stopped.
 const ASK_EVERY: Duration = Duration::from_millis(500);
@@ -349,7 +348,7 @@ impl Slot {
                 self.computed();
                 match self.conclude(folder, token, job, claimed.ctime_ns(), worked)? {
                     Onward::Job(job) => return Ok(Some(*job)),
-                    Onward::Step(step) => step,
+                    Onward::Step(step) => *step,
                     Onward::Lost => return Ok(None),
                 }
             }

@@ -210,19 +210,22 @@ mod tests {
         job.work = Some(Token(u64::MAX));
         job.note = reason;
         job.seq = Seq(u64::MAX);
-        // No job has both: a witness goes when the job comes to rest, and only then someone decides.
-        let mut sampled = job.clone();
-        let long = "d".repeat(2 * MAX_DAEMON);
-        let witness = Witness::new(&long, &long, Recipe(u64::MAX), Hash([0xff; 32]));
-        sampled.witness = Some(Box::new(Witness { at: Time(u64::MAX), ..witness }));
-        if let State::Publishing { publication, .. } = &mut sampled.state {
-            publication.decision = None;
-        }
         let key = job.id.0.to_be_bytes();
-        for job in [job, sampled] {
+        for job in [with_witness(&job), job] {
             let bytes = encode_job(&key, &job).unwrap();
             assert_eq!(decode::<Job>(Table::Jobs, &key, &bytes).unwrap(), job);
         }
+    }
+
+    /// The same with the longest witness. No job has a decision as well: a witness goes when the job comes to rest, and only then someone decides.
+    fn with_witness(job: &Job) -> Job {
+        let long = "d".repeat(2 * MAX_DAEMON);
+        let witness = Witness::new(&long, &long, Recipe(u64::MAX), Hash([0xff; 32]));
+        let mut sampled = Job { witness: Some(Box::new(Witness { at: Time(u64::MAX), ..witness })), ..job.clone() };
+        if let State::Publishing { publication, .. } = &mut sampled.state {
+            publication.decision = None;
+        }
+        sampled
     }
 
     const LATER: u16 = SCHEMA + 1;

@@ -8,7 +8,7 @@ use suture_store::patience::brief;
 use suture_store::{Claim, Ending, Job, State, Step, Witness};
 
 use super::Slot;
-use super::worked::Worked;
+use super::worked::{Onward, Worked};
 use crate::beside;
 use crate::event::Happening;
 use crate::folder::Folder;
@@ -19,15 +19,6 @@ use crate::publish_error::PublishError;
 use crate::reuse::recipe_of;
 use crate::sample::{self as samples, Compared, Second};
 use crate::shared::daemon_name;
-
-/// How it goes on.
-pub(super) enum Onward {
-    /// The intent is durable.
-    Job(Box<Job>),
-    Step(Step),
-    /// The claim is void.
-    Lost,
-}
 
 impl Slot {
     /// Makes the intent durable of what was made, or says what comes instead. `ctime_ns`: last change of the original's inode.
@@ -42,11 +33,11 @@ impl Slot {
         let context = &self.context;
         let conclusion = match worked {
             Worked::Lost => return Ok(Onward::Lost),
-            Worked::Step(step) => return Ok(Onward::Step(step)),
+            Worked::Step(step) => return Ok(Onward::Step(Box::new(step))),
             Worked::None(ending, reason) => Conclusion::None { ending, reason },
             Worked::Report { report, written, reused } => {
                 if let Err(reason) = verify(&report, written.as_ref(), &folder.work(claim.token)) {
-                    return Ok(Onward::Step(Step::Environment { reason }));
+                    return Ok(Onward::Step(Box::new(Step::Environment { reason })));
                 }
                 if reused.is_none() {
                     context.bus.tell(&Happening::Reported { report: &report });
@@ -55,7 +46,7 @@ impl Slot {
             }
         };
         if let Some(witness) = self.sampled(job, &conclusion) {
-            return Ok(Onward::Step(Step::Sampled(Box::new(witness))));
+            return Ok(Onward::Step(Box::new(Step::Sampled(Box::new(witness)))));
         }
         let compared = job.witness.as_ref().map(|witness| (witness, self.compared(witness, &conclusion)));
         let conclusion = match &compared {

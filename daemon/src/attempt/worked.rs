@@ -2,7 +2,7 @@
 
 use suture_core::{ErrorClass, Report};
 use suture_store::job::{Death as StoreDeath, Withdrawal};
-use suture_store::{Ending, Step};
+use suture_store::{Ending, Job, Step};
 
 use crate::fsx::Identity;
 use crate::receipt::ReusedFrom;
@@ -19,6 +19,15 @@ pub(super) enum Worked {
     },
     None(Ending, String),
     Step(Step),
+    /// The claim is void.
+    Lost,
+}
+
+/// How the job goes on.
+pub(super) enum Onward {
+    /// The intent is durable.
+    Job(Box<Job>),
+    Step(Box<Step>),
     /// The claim is void.
     Lost,
 }

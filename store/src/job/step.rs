@@ -203,30 +203,11 @@ impl Job {
         self.state = match (state, step) {
             (State::Running { cancel, .. }, Step::Died(death)) => self.died(hold, *death, cancel, now),
             (State::Running { cancel, .. }, Step::Environment { reason }) => self.put_off(hold, reason, cancel, now),
-            (State::Running { cancel: false, .. }, Step::Wait { reason }) => {
-                self.note = one_line(reason);
-                State::Queued { not_before: Some(now.plus_ms(WAIT_MS)) }
-            }
-            (State::Running { cancel: false, .. }, Step::HandBack) => NOW,
-            (State::Running { cancel: false, .. }, Step::Sampled(witness)) if self.witness.is_none() => {
-                self.note = "it was computed, and is to be computed once more, for a comparison".into();
-                self.witness = Some(Box::new(witness.at(now)));
-                NOW
-            }
-            (State::Running { cancel: false, .. }, Step::HandOn) if self.witness.is_some() => {
-                State::Queued { not_before: Some(now.plus_ms(HAND_ON_MS)) }
-            }
-            (State::Running { cancel: true, .. }, Step::Sampled(_) | Step::HandOn) => {
-                State::Cancelled { why: Withdrawal::Operator }
-            }
-            (State::Running { cancel: false, .. }, Step::NeedsAll) if !hold.alone => {
-                self.needs_all = true;
-                self.note = "its share of the memory was too small; it gets all of it".into();
-                NOW
-            }
-            (State::Running { .. }, Step::HandBack | Step::Wait { .. } | Step::NeedsAll | Step::Cancelled) => {
-                State::Cancelled { why: Withdrawal::Operator }
-            }
+            (State::Running { .. }, Step::Cancelled) => State::Cancelled { why: Withdrawal::Operator },
+            (
+                State::Running { cancel, .. },
+                Step::HandBack | Step::Wait { .. } | Step::NeedsAll | Step::Sampled(_) | Step::HandOn,
+            ) => self.hand_back(hold, step, cancel, now)?,
             (State::Running { .. }, Step::Withdrawn(why)) => State::Cancelled { why: *why },
             // A result that is there is not thrown away because a cancel came late. Who is condemned, the machine says.
             (State::Running { .. }, Step::Intend(publication)) if !publication.ending.is_condemned() => {
@@ -263,6 +244,31 @@ impl Job {
             _ => return None,
         };
         Some(())
+    }
+
+    /// Back into the queue at no cost, for whatever reason; `None` when there was none for it.
+    fn hand_back(&mut self, hold: Hold, step: &Step, cancel: bool, now: Time) -> Option<State> {
+        Some(match step {
+            _ if cancel => State::Cancelled { why: Withdrawal::Operator },
+            Step::Wait { reason } => {
+                self.note = one_line(reason);
+                State::Queued { not_before: Some(now.plus_ms(WAIT_MS)) }
+            }
+            Step::NeedsAll if hold.alone => State::Cancelled { why: Withdrawal::Operator },
+            Step::NeedsAll => {
+                self.needs_all = true;
+                self.note = "its share of the memory was too small; it gets all of it".into();
+                NOW
+            }
+            Step::Sampled(witness) if self.witness.is_none() => {
+                self.note = "it was computed, and is to be computed once more, for a comparison".into();
+                self.witness = Some(Box::new(witness.at(now)));
+                NOW
+            }
+            Step::HandOn if self.witness.is_some() => State::Queued { not_before: Some(now.plus_ms(HAND_ON_MS)) },
+            Step::HandBack => NOW,
+            _ => return None,
+        })
     }
 
     fn park(&mut self, reason: &str, committed: bool, now: Time) -> Option<()> {

@@ -34,7 +34,8 @@ fn f01_killed_at_steps_of_two_attempts() {
         let what = format!("killed at pass {step} of {passes}");
         let first = daemon(&hot).env("SUTURE_CRASH_AT", format!("*:{step}")).status().expect("it starts");
         assert!(was_killed(first) || step + 8 > passes, "{what}: was not");
-        assert_eq!(daemon(&hot).status().expect("it starts").code(), Some(1), "{what}");
+        let status = daemon(&hot).status().expect("it starts");
+        assert!(status.code().is_some_and(|code| code < 2), "{what}: {status}");
         assert_eq!(state(&hot), expected, "{what}");
         assert_at_rest(&hot, &what);
     });

@@ -220,7 +220,7 @@ fn log_compared(job: &Job, compared: &Compared) {
         Compared::Equal => tracing::info!(job, result, first, "Computed twice: both results are the same."),
         Compared::Different(reason) => tracing::error!(job, result, first, reason, "Computed twice: the results differ."),
         Compared::OtherVersion => tracing::info!(job, result, first, "Computed twice, by two versions: nothing is compared."),
-        Compared::NotCompared => tracing::info!(job, result, first, "A second attempt cannot be compared with the first."),
+        Compared::Unlike => tracing::info!(job, result, first, "A second attempt cannot be compared with the first."),
     }
 }
 

@@ -53,8 +53,8 @@ pub(crate) enum Compared {
     Different(String),
     /// An upgrade came between the attempts.
     OtherVersion,
-    /// Something else that decides the result, or whether there is one, was not the same.
-    NotCompared,
+    /// Something else that decides the result, or whether there is one, was not the same: nothing is compared.
+    Unlike,
 }
 
 impl Compared {
@@ -67,7 +67,7 @@ impl Compared {
             Self::Equal => equal,
             Self::Different(_) => different,
             Self::OtherVersion => other_version,
-            Self::NotCompared => not_compared,
+            Self::Unlike => not_compared,
         }
     }
 }
@@ -88,10 +88,10 @@ pub(crate) fn compare(witness: &Witness, daemon: &str, second: Second) -> Compar
     let made = match second {
         // The settings of hosts may differ.
         Second::Good { recipe, .. } | Second::Bad { recipe: Some(recipe), .. } if recipe != witness.recipe => {
-            return Compared::NotCompared;
+            return Compared::Unlike;
         }
         // Too little memory is a refusal, never another result: the other host had more.
-        Second::Refused => return Compared::NotCompared,
+        Second::Refused => return Compared::Unlike,
         Second::Good { output, .. } if output == witness.output => return Compared::Equal,
         Second::Good { output, .. } => format!("BLAKE3 {output}"),
         Second::Bad { .. } => "no good result".to_owned(),
@@ -170,13 +170,13 @@ mod tests {
             let Compared::Different(words) = compared else { panic!("{recipe:?}: {compared:?}") };
             assert!(words.contains("then b:/state made no good result"), "{words}");
         }
-        assert_eq!(compare(&first, "b:/state", Second::Bad { recipe: Some(Recipe(8)) }), Compared::NotCompared);
-        assert_eq!(compare(&first, "b:/state", Second::Refused), Compared::NotCompared);
+        assert_eq!(compare(&first, "b:/state", Second::Bad { recipe: Some(Recipe(8)) }), Compared::Unlike);
+        assert_eq!(compare(&first, "b:/state", Second::Refused), Compared::Unlike);
     }
 
     #[test]
     fn what_is_not_made_alike_is_not_compared() {
-        assert_eq!(compare(&made_by("a:/state"), "b:/state", good(8, 2)), Compared::NotCompared);
+        assert_eq!(compare(&made_by("a:/state"), "b:/state", good(8, 2)), Compared::Unlike);
         let older = Witness { engine: "0.0.1".into(), ..made_by("a:/state") };
         assert_eq!(compare(&older, "b:/state", good(7, 2)), Compared::OtherVersion);
     }

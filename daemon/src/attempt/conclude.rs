@@ -89,7 +89,7 @@ impl Slot {
     pub(super) fn tell_condemned(&self, job: &Job, next: &Job) {
         if let (Some(_), State::Concluded { ending, reason, .. }) = (&job.witness, &next.state) {
             let is_the_files = *ending == Ending::Quarantined;
-            let compared = if is_the_files { Compared::Different(reason.clone()) } else { Compared::NotCompared };
+            let compared = if is_the_files { Compared::Different(reason.clone()) } else { Compared::Unlike };
             self.context.bus.tell(&Happening::Compared { job: next, compared: &compared });
         }
     }
@@ -208,7 +208,7 @@ mod tests {
         }
         let none = judged(unreadable(), &witness, &differs());
         assert!(matches!(none, Conclusion::None { ending: Ending::NeedsReview, reason } if reason == "two results; no mesh"));
-        for compared in [Compared::Equal, Compared::OtherVersion, Compared::NotCompared] {
+        for compared in [Compared::Equal, Compared::OtherVersion, Compared::Unlike] {
             let judged = judged(made(Outcome::Clean), &witness, &compared);
             let report = of(&judged);
             assert_eq!((report.outcome, report.verdict.reasons.len()), (Outcome::Clean, 0), "{compared:?}");
@@ -220,7 +220,7 @@ mod tests {
             "{told:?}"
         );
         let refused = Conclusion::None { ending: Ending::Refused, reason: "too large".into() };
-        let Conclusion::None { ending, reason } = judged(refused, &witness, &Compared::NotCompared) else { panic!("none") };
+        let Conclusion::None { ending, reason } = judged(refused, &witness, &Compared::Unlike) else { panic!("none") };
         assert!(ending == Ending::Refused && reason.starts_with("too large; an earlier attempt, by a:/state"), "{reason}");
     }
 }

@@ -1,4 +1,4 @@
-//! What every [`JobStore`] must do, as one suite; and the small things that tests of store and daemon need.
+//! What every [`JobStore`](crate::JobStore) must do, as one suite; and the small things that tests of store and daemon need.
 
 use std::sync::Arc;
 
@@ -27,7 +27,7 @@ type Check = fn(&mut dyn Subject, &ManualClock) -> Result<(), StoreError>;
 /// Runs every check on a fresh store from `make`.
 ///
 /// # Panics
-/// When the store does not do what [`JobStore`] promises.
+/// When the store does not do what [`JobStore`](crate::JobStore) promises.
 pub fn conformance(make: &dyn Fn(Arc<dyn Clock>) -> Box<dyn Subject>) {
     let checks: [(&str, Check); 33] = [
         ("submission is idempotent", claims::submission_is_idempotent),

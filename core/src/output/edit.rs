@@ -92,7 +92,7 @@ impl Edit {
     /// a bit for each of so many `records`. O(records).
     pub(crate) fn over(self, gone: &[u64], turned: &[u64], records: usize) -> Self {
         let stayed = Stayed::of(gone, records);
-        let added = self.added.from_others(|from| match from {
+        let added = self.added.with_origins(|from| match from {
             FaceOrigin::Part(t) => FaceOrigin::Part(stayed.record(t)),
             other => other,
         });

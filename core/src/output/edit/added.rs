@@ -13,7 +13,7 @@ pub(crate) enum NewRecords {
     Memory(Vec<Record>),
     /// The file is there as long as its spool is.
     File {
-        mesh: MeshFile,
+        mesh: Box<MeshFile>,
         _spool: Nameless,
         count: usize,
     },
@@ -98,7 +98,7 @@ impl Added {
     }
 
     /// The same with other faces that they come from.
-    pub(super) fn from_others(mut self, other: impl Fn(FaceOrigin) -> FaceOrigin) -> Self {
+    pub(super) fn with_origins(mut self, other: impl Fn(FaceOrigin) -> FaceOrigin) -> Self {
         self.own_from.iter_mut().for_each(|from| *from = other(*from));
         self
     }

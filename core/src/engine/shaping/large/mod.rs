@@ -198,7 +198,11 @@ impl<'a> Course<'a> {
         };
         // As many as memory may not hold: they stay where they are.
         let count = after - self.survivors;
-        let added = self.spool.take().map(|(mesh, spool)| NewRecords::File { mesh, _spool: spool, count }).unwrap_or_default();
+        let added = self
+            .spool
+            .take()
+            .map(|(mesh, spool)| NewRecords::File { mesh: Box::new(mesh), _spool: spool, count })
+            .unwrap_or_default();
         let mut gone = bits::all(self.records.len());
         gone.iter_mut().zip(&self.stays).for_each(|(gone, stays)| *gone &= !stays);
         Change { gone, added, told: Told::Simplified(told) }

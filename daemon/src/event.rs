@@ -212,7 +212,7 @@ fn of_job(job: &Job) -> Value {
     told
 }
 
-/// What came of computing a job twice.
+/// Logs the comparison of a job that was computed twice.
 fn log_compared(job: &Job, compared: &Compared) {
     let first = job.witness.as_ref().map(|witness| witness.daemon.as_str());
     let (job, result) = (job.id.0, compared.word());

@@ -16,7 +16,7 @@ pub(crate) fn is_one(id: JobId, one_in: u64) -> bool {
     u64::from_be_bytes([a, b, c, d, e, f, g, h]).checked_rem(one_in) == Some(0)
 }
 
-/// What the first attempt leaves to compare with.
+/// The result of the first attempt, to compare with.
 pub(crate) fn witness(daemon: &str, recipe: Recipe, output: Hash) -> Witness {
     Witness::new(daemon, ENGINE, recipe, output)
 }
@@ -34,7 +34,7 @@ pub(crate) fn is_for_another(job: &Job, daemon: &str, hosts: &dyn Fn() -> Vec<Ho
     hosts().iter().any(could)
 }
 
-/// What the second attempt came to.
+/// The end of the second attempt.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Second {
     /// A result that may go to `out/`.
@@ -45,7 +45,7 @@ pub(crate) enum Second {
     Refused,
 }
 
-/// What came of the comparison.
+/// The outcome of the comparison.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum Compared {
     Equal,

@@ -42,7 +42,7 @@ pub(crate) struct Simplified {
     /// Triangles that were asked for: of a peer, as many as suture left.
     pub(crate) asked: u64,
     pub(crate) tool: Simplifier,
-    /// What suture was told of it.
+    /// The memory that suture was told to use, if it was told any.
     #[serde(default)]
     pub(crate) memory: Option<String>,
     /// The program that ran.

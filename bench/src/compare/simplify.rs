@@ -27,7 +27,7 @@ pub(crate) struct Asked {
     /// The share of them that is left.
     pub(crate) ratio: f64,
     pub(crate) runs: usize,
-    /// What suture is told, without peers then.
+    /// The memory that suture is told to use; its peers are left out then.
     pub(crate) memory: Option<String>,
     /// The largest mesh of which nearness is measured.
     pub(crate) judge_up_to: u64,

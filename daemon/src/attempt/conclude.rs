@@ -1,4 +1,4 @@
-//! What the end of an attempt leads to: the intent to publish, a second attempt to compare with, or another step of the job.
+//! The way on from the end of an attempt: the intent to publish, a second attempt to compare with, or another step of the job.
 
 use std::path::Path;
 
@@ -65,7 +65,7 @@ impl Slot {
         let Conclusion::Report { report, reused: None, .. } = conclusion else { return None };
         let config = self.context.settings.now();
         let is_one = job.witness.is_none() && samples::is_one(job.id, config.check_one_in());
-        // What lies beside the mesh may be another file by then.
+        // A file beside the mesh may be another one by then.
         if !is_one || !report.outcome.is_good() || is_forced(&job.source.path) || beside::has_any(&report.profile) {
             return None;
         }
@@ -100,7 +100,7 @@ impl Slot {
     }
 }
 
-/// What a second attempt came to.
+/// The end of a second attempt.
 fn second(conclusion: &Conclusion) -> Second {
     match conclusion {
         Conclusion::None { ending: Ending::Refused, .. } => Second::Refused,

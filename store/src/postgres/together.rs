@@ -1,4 +1,4 @@
-//! What several callers of one daemon ask at the same time goes to the database together: one statement, one way there and back, one commit for all that
+//! Questions that several callers of one daemon ask at the same time go to the database together: one statement, one way there and back, one commit for all that
 //! wait while the one before is under way. Whoever comes alone waits for no one.
 
 use std::sync::{Mutex, MutexGuard, PoisonError};

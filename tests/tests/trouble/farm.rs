@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use rustix::process::Signal;
 use suture_tests::proxy::Mood;
 
-use crate::farm_members::{Farm, Member};
+use crate::farm_members::{Farm, Member, is_over};
 use crate::stage::row;
 use crate::world::{fill_bytes, is_root};
 
@@ -124,7 +124,7 @@ fn machines_fail_and_each_file_has_one_result() {
         let last = if number + 1 == rounds { files } else { (number + 1) * batch };
         let files = number * batch + 1..last + 1;
         Round { farm: &farm, intake: &mut intake, workers: &mut workers, number, files }.run();
-        let ended = farm.jobs().iter().filter(|job| crate::farm_members::is_over(job)).count();
+        let ended = farm.jobs().iter().filter(|job| is_over(job)).count();
         println!("round {number}: {ended} ended after {:?}", begun.elapsed());
     }
     workers.push(intake);

@@ -107,15 +107,15 @@ impl Farm {
         let (mut most, mut since) = (0, Instant::now());
         loop {
             members.iter_mut().for_each(Member::tend);
-            let ended = self.jobs().iter().filter(|job| is_over(job)).count();
-            if ended as u64 >= count {
+            let (ended, open): (Vec<_>, Vec<_>) = self.jobs().into_iter().partition(is_over);
+            if ended.len() as u64 >= count {
                 return;
             }
-            if ended > most {
-                (most, since) = (ended, Instant::now());
+            if ended.len() > most {
+                (most, since) = (ended.len(), Instant::now());
             }
-            let open: Vec<_> = self.jobs().into_iter().filter(|job| !is_over(job)).take(3).collect();
-            assert!(since.elapsed() < Duration::from_secs(300), "{ended} of {count} ended, and no more do: {open:#?}");
+            let some = open.iter().take(3).collect::<Vec<_>>();
+            assert!(since.elapsed() < Duration::from_secs(300), "{most} of {count} ended, and no more do: {some:#?}");
             std::thread::sleep(Duration::from_secs(1));
         }
     }

@@ -5,8 +5,10 @@ use std::os::unix::fs::{MetadataExt, PermissionsExt};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, SystemTime};
 
+use suture_store::testkit::Chance;
+
 use crate::stage::{Stage, holes, row};
-use crate::world::{Dice, Mount, is_root, processes_of, send};
+use crate::world::{Mount, is_root, processes_of, send};
 
 const PARTS: [&str; 3] = ["hot/out", "hot/in/sub", "hot/done"];
 /// An hour in the year 2001.
@@ -80,20 +82,20 @@ fn f02_killed_while_files_cross() {
 }
 
 fn kill_while_crossing(seed: u64) -> u64 {
-    let mut dice = Dice(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15));
+    let mut chance = Chance::new(seed);
     let stage = Stage::new();
     let _mounts = PARTS.map(|part| Mount::tmpfs(&stage.at(part), "size=16m", 0));
     drop_three(&stage);
     let mut kills = 0;
     for _ in 0..4 {
         let mut daemon = stage.start(stage.watch(&["--once"]));
-        let pause = 40 + dice.below(300);
+        let pause = 40 + chance.below(300);
         std::thread::sleep(Duration::from_millis(pause));
         if daemon.child.try_wait().unwrap().is_some() {
             break;
         }
         kills += 1;
-        if dice.below(2) == 0 {
+        if chance.one_in(2) {
             daemon.cut();
         } else {
             daemon.signal(libc::SIGKILL);

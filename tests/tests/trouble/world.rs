@@ -155,15 +155,3 @@ pub(crate) fn set_limit(pid: u32, resource: libc::__rlimit_resource_t, value: u6
         }
     }
 }
-
-/// A small generator of numbers (xorshift), so that a failing run can be repeated from its seed.
-pub(crate) struct Dice(pub u64);
-
-impl Dice {
-    pub(crate) fn below(&mut self, bound: u64) -> u64 {
-        self.0 ^= self.0 << 13;
-        self.0 ^= self.0 >> 7;
-        self.0 ^= self.0 << 17;
-        self.0 % bound
-    }
-}

@@ -27,6 +27,11 @@ pub(crate) enum Told {
 }
 
 impl Change {
+    /// The mesh stays as it is.
+    pub(super) fn none(told: Told) -> Self {
+        Self { gone: Vec::new(), added: NewRecords::default(), told }
+    }
+
     /// Whether the mesh stays as it is.
     pub(crate) fn is_none(&self) -> bool {
         self.count_gone() == 0 && self.added.is_empty()

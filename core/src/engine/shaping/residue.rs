@@ -8,7 +8,6 @@ use super::corrections::{self, FromFiles, Origins};
 use crate::contract::report::{MOST_LISTED, Outcome, Report, Residue, ResidueRegion, ResidueSuspect};
 use crate::engine::mesh::Mesh;
 use crate::engine::work::Work;
-use crate::output::edit::NewRecords;
 use crate::residue::{self, Corrections, Cuts, FIT_LEAST, Fit, Found, Frame, Kind, Repaired};
 use crate::simplify::{self, Input, Options};
 use crate::smooth;
@@ -58,7 +57,7 @@ fn suspect(mesh: &Mesh, options: &residue::Options<'_>) -> Result<Change, String
         within: suspect.within,
     };
     let suspects = Some(found.iter().take(MOST_LISTED).map(told).collect());
-    Ok(Change { gone: Vec::new(), added: NewRecords::default(), told: Told::Residue(Residue { suspects, ..Residue::default() }) })
+    Ok(Change::none(Told::Residue(Residue { suspects, ..Residue::default() })))
 }
 
 /// Puts residue into a report. Where it was looked for without a path, a person has to look at the result.
@@ -119,14 +118,14 @@ fn removed(mesh: &Mesh, options: &residue::Options<'_>, work: Work<'_>) -> Resul
     drop(cuts);
     if let Some(why_not) = misfit(found.fit) {
         let told = Residue { why_not: Some(why_not), path_fit: Some(found.fit.share()), ..Residue::default() };
-        return Ok(Change { gone: Vec::new(), added: NewRecords::default(), told: Told::Residue(told) });
+        return Ok(Change::none(Told::Residue(told)));
     }
     let mut repaired = residue::repair(view, &found, options).map_err(named)?;
     found.targets = Vec::new();
     let mut told = told(&found, &header);
     told.path_axes = frame.map(|frame| frame.to_string());
     if told.triangles_before == 0 {
-        return Ok(Change { gone: Vec::new(), added: NewRecords::default(), told: Told::Residue(told) });
+        return Ok(Change::none(Told::Residue(told)));
     }
     let settled = smooth::settle(mesh.vertices(), mesh.faces(), &repaired.points);
     repaired.points = Vec::new();

@@ -5,13 +5,14 @@ use std::time::{Duration, Instant};
 
 use rustix::process::Signal;
 use suture_tests::proxy::Mood;
+use suture_tests::served::wait_until;
 
 use crate::farm_members::{Farm, Member, is_over};
 use crate::stage::row;
 use crate::world::{fill_bytes, is_root};
 
-/// Machines fail when all have work.
-const BEGIN: u64 = 10;
+/// Machines fail from then on, as soon as someone works.
+const BEGIN: u64 = 1;
 /// Until they are well again: longer than a lease, which is a minute.
 const ROUND: u64 = BEGIN + 75;
 /// Then all is well for so long.
@@ -83,7 +84,10 @@ impl Round<'_, '_> {
         for second in 0..ROUND + CALM {
             match (second, is_even) {
                 (0, _) => self.farm.drop_files(self.files.start..half),
-                (BEGIN, _) => self.each(|_| true, befall),
+                (BEGIN, _) => {
+                    wait_until("someone works", || self.farm.jobs().iter().any(|job| job["kind"] == "running"));
+                    self.each(|_| true, befall);
+                }
                 (13, true) => self.farm.server.kill(),
                 (13, false) => fill_bytes(&filler),
                 (14, _) => self.farm.drop_files(half..self.files.end),

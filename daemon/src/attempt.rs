@@ -25,6 +25,7 @@ use crate::create;
 use crate::event_bus::Bus;
 use crate::folder::Folder;
 use crate::force::is_forced;
+use crate::fsx;
 use crate::handed::Handed;
 use crate::past::Unread;
 use crate::publish::{Conclusion, Desk, OUTPUT, discard, litter};
@@ -222,6 +223,9 @@ impl Slot {
         let span = tracing::info_span!("job", job = job.id.0, file = %job.source.path);
         let _in_span = span.enter();
         let work = job.work.unwrap_or(claim.token);
+        if let Some(folder) = self.context.folder(&job).filter(|_| work != claim.token) {
+            look_anew(folder, &job);
+        }
         while !matches!(job.duty(), Duty::Queue | Duty::Rest) {
             let next = match self.step(claim, &job, turn) {
                 Err(PublishError::Store(error)) => Err(error),
@@ -460,6 +464,15 @@ impl Slot {
             Lease::Lost => Worked::Lost,
             Lease::Held => Worked::Step(Step::HandBack),
         }
+    }
+}
+
+/// Another machine may have begun what this one goes on with.
+fn look_anew(folder: &Folder, job: &Job) {
+    let (area, path) = job.original();
+    let original = folder.area(area).join(path.to_path());
+    for there in [&folder.work_root(), &folder.work(job.work_token()), fsx::folder_of(&original)] {
+        folder.look_anew(there);
     }
 }
 

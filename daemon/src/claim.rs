@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 use rustix::fs::{AtFlags, CWD};
 use suture_core::ErrorClass;
 use suture_store::job::Withdrawal;
-use suture_store::{Job, Token};
+use suture_store::{Job, Source, Token};
 
 use crate::bucket::Trouble;
 use crate::create;
@@ -74,6 +74,9 @@ pub(crate) struct Claimed {
     identity: Identity,
     /// It was copied: its name must still stand for it then.
     copied: bool,
+    /// It lies on a share: another machine that once worked on it may give its own second name of it up at any time, which changes the time of the
+    /// inode. Then size and time of the content must do, and whoever publishes compares the content.
+    is_shared: bool,
 }
 
 impl Claimed {
@@ -82,14 +85,19 @@ impl Claimed {
     /// # Errors
     /// As `fstat` and `lstat`: then it is not known.
     pub(crate) fn is_unchanged(&self) -> io::Result<bool> {
-        let open = self.original.identity()? == self.identity;
-        Ok(open && (!self.copied || fsx::look(&self.original.path)? == Some(self.identity)))
+        let is_same = |found: &Identity| is_same(found, &self.identity, self.is_shared);
+        Ok(is_same(&self.original.identity()?)
+            && (!self.copied || fsx::look(&self.original.path)?.is_some_and(|found| is_same(&found))))
     }
 
     /// Last change of its inode; as long as that stays, its content does.
     pub(crate) fn ctime_ns(&self) -> i64 {
         self.identity.ctime_ns
     }
+}
+
+fn is_same(found: &Identity, before: &Identity, is_shared: bool) -> bool {
+    if is_shared { found.same_content(before) } else { found == before }
 }
 
 /// Why a file could not be claimed.
@@ -111,12 +119,19 @@ fn failed<'a>(what: &'a str) -> impl FnOnce(io::Error) -> Unclaimed + 'a {
     }
 }
 
+/// The device of a file on a share, as a job notes it: none.
+pub(crate) const NO_DEVICE: u64 = 0;
+
+/// Is this the very file, whatever became of its content?
+pub(crate) fn is_inode(found: &Identity, source: &Source) -> bool {
+    found.ino == source.ino && (source.dev == NO_DEVICE || found.dev == source.dev)
+}
+
 /// Is this the file that the job was submitted for? Where this program has moved it itself, perhaps to another file system, size and
 /// time must do.
 pub(crate) fn is_source(found: &Identity, job: &Job) -> bool {
     let source = &job.source;
-    let same_inode = (found.dev, found.ino) == (source.dev, source.ino);
-    (same_inode || job.moved_to.is_some()) && (found.size, found.mtime_ns) == (source.size, source.mtime_ns)
+    (is_inode(found, source) || job.moved_to.is_some()) && (found.size, found.mtime_ns) == (source.size, source.mtime_ns)
 }
 
 /// Takes the job's original into `work`, which is made. `free`: bytes that may still be written there.
@@ -128,11 +143,13 @@ pub(crate) fn claim(folder: &Folder, job: &Job, work: &Path, free: u64) -> Resul
         return fetch(folder, shelf, job, work, free);
     }
     let (area, path) = job.original();
-    let original = open(&folder.area(area).join(path.to_path()))?;
+    let original = folder.area(area).join(path.to_path());
+    folder.look_anew(fsx::folder_of(&original));
+    let original = open(&original)?;
     let before = look(&original, job)?;
     has_room(before.size.saturating_mul(3), free)?;
     make_work(work)?;
-    take(original, job, &work.join(CLAIMED))
+    take(original, job, &work.join(CLAIMED), folder.is_shared)
 }
 
 /// Room for the result and for what the engine puts aside: a large file must not fill the disk half way.
@@ -172,7 +189,7 @@ fn fetch(folder: &Folder, shelf: &Shelf, job: &Job, work: &Path, free: u64) -> R
     shelf.cache.give(&shelf.bucket, &key, &found.version, &claimed).map_err(away)?;
     let original = open(&claimed)?;
     let identity = original.identity().map_err(failed("the file cannot be looked at"))?;
-    Ok(Claimed { original, identity, copied: false })
+    Ok(Claimed { original, identity, copied: false, is_shared: false })
 }
 
 /// Gives the second name of an attempt's original up. That changes the time of the inode, which another attempt would take for a change of the file:
@@ -201,7 +218,7 @@ fn look(original: &Original, job: &Job) -> Result<Identity, Unclaimed> {
     if is_source(&found, job) { Ok(found) } else { Err(Unclaimed::Withdrawn(Withdrawal::Changed)) }
 }
 
-fn take(original: Original, job: &Job, claimed: &Path) -> Result<Claimed, Unclaimed> {
+fn take(original: Original, job: &Job, claimed: &Path, is_shared: bool) -> Result<Claimed, Unclaimed> {
     let linked = original.link(claimed).is_ok();
     if !linked {
         // A second name that is there already would count as a change when it goes.
@@ -211,11 +228,11 @@ fn take(original: Original, job: &Job, claimed: &Path) -> Result<Claimed, Unclai
     let identity = look(&original, job)?;
     if !linked {
         create::copy_new(&original.file, claimed).map_err(failed("the file cannot be copied"))?;
-        if look(&original, job)? != identity {
+        if !is_same(&look(&original, job)?, &identity, is_shared) {
             return Err(Unclaimed::Withdrawn(Withdrawal::Changed));
         }
     }
-    let claimed = Claimed { original, identity, copied: !linked };
+    let claimed = Claimed { original, identity, copied: !linked, is_shared };
     match claimed.is_unchanged() {
         Ok(true) => Ok(claimed),
         Ok(false) => Err(Unclaimed::Withdrawn(Withdrawal::Changed)),
@@ -248,7 +265,7 @@ mod tests {
         assert_eq!(content(), before);
         // A second name that is there already, of the original itself.
         let original = Original::open(&scene.folder.inbox().join("part.stl")).unwrap();
-        let taken = take(original, &scene.claim.job, &work.join(CLAIMED));
+        let taken = take(original, &scene.claim.job, &work.join(CLAIMED), false);
         assert!(taken.is_ok(), "it gets an inode of its own");
         assert_eq!((content(), std::fs::read(work.join(CLAIMED)).unwrap()), (before.clone(), before));
         let inode = |path: &Path| Identity::of(path).unwrap().ino;
@@ -270,6 +287,33 @@ mod tests {
         assert!(changed(claim()));
         assert!(!work.exists(), "nothing was begun");
         assert!(matches!(scene.claim.job.state, State::Running { .. }));
+    }
+
+    /// On a share the device is not told by, and the second name that another machine gives up is no change of the file; another content is.
+    #[test]
+    fn on_a_share_a_file_is_told_by_its_number_and_its_content() {
+        let scene = Scene::dropped();
+        let path = scene.folder.inbox().join("part.stl");
+        let found = Identity::of(&path).unwrap();
+        let mut job = scene.claim.job.clone();
+        assert!(!is_source(&Identity { dev: found.dev + 1, ..found }, &job), "on a machine of its own");
+        job.source.dev = NO_DEVICE;
+        assert!(is_source(&Identity { dev: found.dev + 1, ..found }, &job));
+        assert!(!is_source(&Identity { ino: found.ino + 1, ..found }, &job));
+        let theirs = scene.folder.root.join("theirs");
+        std::fs::hard_link(&path, &theirs).unwrap();
+        let (work, alone) = (scene.folder.work(scene.claim.token), scene.folder.root.join("alone"));
+        make_work(&work).unwrap();
+        make_work(&alone).unwrap();
+        let take = |work: &Path, is_shared| take(Original::open(&path).unwrap(), &job, &work.join(CLAIMED), is_shared).unwrap();
+        let alone = take(&alone, false);
+        std::thread::sleep(std::time::Duration::from_millis(20));
+        let shared = take(&work, true);
+        assert!(!alone.is_unchanged().unwrap(), "its inode changed");
+        std::fs::remove_file(&theirs).unwrap();
+        assert!(shared.is_unchanged().unwrap());
+        std::fs::write(&path, b"AS DROPPED").unwrap();
+        assert!(!shared.is_unchanged().unwrap());
     }
 
     /// In place, by a new name or by none at all.

@@ -28,6 +28,7 @@ pub(crate) mod keep;
 pub(crate) mod read;
 pub(crate) mod roles;
 mod sampling;
+pub(crate) mod share;
 mod shared;
 pub(crate) mod show;
 pub(crate) mod taken;
@@ -56,6 +57,8 @@ pub(crate) struct FolderConfig {
     pub path: PathBuf,
     /// Its parts are there, and `path` is the scratch of this machine.
     pub bucket: Option<BucketConfig>,
+    /// It lies on a share, and daemons on other machines serve it, too.
+    pub is_shared: bool,
     /// Profile of files that lie in no sub-folder.
     pub profile: String,
     /// Originals stay in `in/`, which may be read-only.
@@ -75,12 +78,18 @@ impl FolderConfig {
             name: name_of(path),
             path: path.to_owned(),
             bucket: None,
+            is_shared: false,
             profile: DEFAULT_PROFILE.into(),
             leave_originals: false,
             priority: Priority::default(),
             share: Share::default(),
             on_taken: OnTaken::default(),
         }
+    }
+
+    /// May daemons on several machines serve it?
+    pub(crate) fn is_for_many(&self) -> bool {
+        self.bucket.is_some() || self.is_shared
     }
 }
 

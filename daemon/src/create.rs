@@ -3,7 +3,7 @@
 //! every other way to write.
 
 use std::ffi::{CStr, OsString};
-use std::fs::{File, OpenOptions};
+use std::fs::{File, Metadata, OpenOptions, TryLockError};
 use std::io::{self, Write};
 use std::os::unix::fs::OpenOptionsExt;
 use std::path::{Path, PathBuf};
@@ -148,13 +148,60 @@ pub(crate) fn copy_content(mut from: &File, to: &Path) -> io::Result<File> {
     }
 }
 
-/// A file to be locked, made when missing. It is open for reading: a lock needs no more.
-///
-/// # Errors
-/// As `open`.
-pub(crate) fn lock_file(path: &Path) -> io::Result<File> {
-    mark(path)?;
-    open_to_read(path)
+/// A file that can be locked, and not written to: it is open for writing, which an exclusive lock needs on NFS (flock(2)), and nothing of it shows that.
+#[derive(Debug)]
+pub(crate) struct LockFile(File);
+
+impl LockFile {
+    /// Opens one, made when missing.
+    ///
+    /// # Errors
+    /// As `open`.
+    pub(crate) fn open(path: &Path) -> io::Result<Self> {
+        mark(path)?;
+        Self::of(path)
+    }
+
+    /// Opens one that is there.
+    ///
+    /// # Errors
+    /// As `open`.
+    pub(crate) fn open_if_there(path: &Path) -> io::Result<Option<Self>> {
+        fsx::if_there(Self::of(path))
+    }
+
+    fn of(path: &Path) -> io::Result<Self> {
+        let flags = flags(OFlags::NOFOLLOW | OFlags::NONBLOCK);
+        match OpenOptions::new().read(true).write(true).custom_flags(flags).open(path) {
+            // Another user's: on a local file system the right to read does for a lock.
+            Err(error) if error.kind() == io::ErrorKind::PermissionDenied => open_to_read(path).map(Self),
+            opened => opened.map(Self),
+        }
+    }
+
+    /// Locks it against everyone else.
+    ///
+    /// # Errors
+    /// As `flock`.
+    pub(crate) fn try_lock(&self) -> Result<(), TryLockError> {
+        self.0.try_lock()
+    }
+
+    /// Locks it with others.
+    ///
+    /// # Errors
+    /// As `flock`.
+    pub(crate) fn try_lock_shared(&self) -> Result<(), TryLockError> {
+        self.0.try_lock_shared()
+    }
+
+    /// As `fstat`.
+    ///
+    /// # Errors
+    /// As `fstat`.
+    pub(crate) fn metadata(&self) -> io::Result<Metadata> {
+        self.0.metadata()
+    }
 }
 
 /// Opens what is there for reading, and for nothing else. A link of that name is not followed, a pipe not waited for.

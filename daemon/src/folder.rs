@@ -10,14 +10,15 @@ use suture_store::job::Area;
 use suture_store::{RelPath, Token};
 
 use crate::alike::Alike;
+use crate::claim::NO_DEVICE;
 use crate::config::FolderConfig;
 use crate::config::taken::OnTaken;
-use crate::fsx;
 pub(crate) use crate::ground::{FolderError, is_fading, make_parent};
 use crate::ground::{Ground, LOCK, PARTS, PRIVATE, Trace, id};
 use crate::receipt::{RECEIPT, REPORT};
 use crate::sentinel::{Answer, Sentinel};
 use crate::shelf::Shelf;
+use crate::{create, fsx};
 
 /// Part of a hot folder that holds results.
 const OUT: &str = "out";
@@ -35,6 +36,8 @@ pub(crate) struct Folder {
     pub alike: Alike,
     /// Its parts are there; here is only what this machine works on.
     pub bucket: Option<Shelf>,
+    /// Daemons on other machines serve it, too.
+    pub is_shared: bool,
     ground: Mutex<Result<Ground, Trace>>,
     /// `None`: whoever looks waits as long as it takes.
     sentinel: Option<Sentinel>,
@@ -61,7 +64,7 @@ impl Folder {
         let root = absolute(config)?;
         let ground = match known.filter(|known| known.missing(&root).is_some()) {
             Some(known) => Err(known.clone()),
-            None => Ok(take(&root)?),
+            None => Ok(take(&root, config.is_shared)?),
         };
         Ok(Self::at(root, config, ground))
     }
@@ -102,6 +105,7 @@ impl Folder {
             on_taken,
             alike: Alike::default(),
             bucket: None,
+            is_shared: config.is_shared,
             ground: Mutex::new(ground),
             sentinel: None,
         }
@@ -189,8 +193,42 @@ impl Folder {
         if let Some(missing) = trace.missing(&self.root) {
             return Err(missing);
         }
-        *ground = Ok(take(&self.root).map_err(|error| error.to_string())?);
+        *ground = Ok(take(&self.root, self.is_shared).map_err(|error| error.to_string())?);
         Ok(())
+    }
+
+    /// Is it this daemon that looks for drops in it, and does what one has to do alone?
+    pub(crate) fn keeps(&self) -> bool {
+        !self.is_shared || self.ground().as_ref().is_ok_and(Ground::keeps)
+    }
+
+    /// Keeps it from now on, if no other daemon does. Returns whether this one does.
+    pub(crate) fn try_keep(&self) -> bool {
+        if !self.is_shared {
+            return true;
+        }
+        match self.ground().as_mut().map(Ground::try_keep) {
+            Ok(Ok(keeps)) => keeps,
+            Ok(Err(error)) => {
+                tracing::debug!(folder = %self.root.display(), %error, "The lock of a shared folder cannot be asked for.");
+                false
+            }
+            Err(_) => false,
+        }
+    }
+
+    /// The device of a file, as a job notes it: each machine has a number of its own for a share.
+    pub(crate) fn noted_device(&self, device: u64) -> u64 {
+        if self.is_shared { NO_DEVICE } else { device }
+    }
+
+    /// Has this machine ask the server of a share what lies in that folder, where it may remember an older state of it: opening a folder does that (NFS,
+    /// close-to-open consistency).
+    pub(crate) fn look_anew(&self, folder: &Path) {
+        if self.is_shared {
+            // What cannot be opened is the business of whoever looks there.
+            drop(create::open_to_read(folder));
+        }
     }
 
     /// Why nothing new is taken of it when its disk, or that of its results, has no room, in words.
@@ -323,13 +361,13 @@ fn parts_apart(root: &Path) -> Result<(), FolderError> {
     Ok(())
 }
 
-/// Makes a folder's parts and takes it, if it may be a hot one.
-fn take(root: &Path) -> Result<Ground, FolderError> {
+/// Makes a folder's parts and takes it, or visits it where others serve it, too, if it may be a hot one.
+fn take(root: &Path, is_shared: bool) -> Result<Ground, FolderError> {
     if let Some(outer) = outer_folder(root)? {
         return Err(FolderError::Within { root: root.to_owned(), outer });
     }
     parts_apart(root)?;
-    Ground::take(root)
+    if is_shared { Ground::visit(root) } else { Ground::take(root) }
 }
 
 /// What a name in `in/` is.

@@ -6,7 +6,7 @@
 //! is missing; on the same mount it was removed and made anew.
 
 use std::collections::BTreeMap;
-use std::fs::{File, Metadata, TryLockError};
+use std::fs::{Metadata, TryLockError};
 use std::io;
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
@@ -16,8 +16,11 @@ use rustix::fs::{AtFlags, CWD, StatxAttributes, StatxFlags};
 use serde::{Deserialize, Serialize};
 use suture_core::ErrorClass;
 
+use crate::create::{self, LockFile};
 use crate::fsx::{self, Identity};
-use crate::{create, rights};
+use crate::rights;
+
+mod shared;
 
 /// All parts of a hot folder.
 pub(crate) const PARTS: [&str; 6] = ["in", "out", "done", "failed", "quarantine", ".suture/work"];
@@ -38,6 +41,10 @@ pub(crate) enum FolderError {
     Within { root: PathBuf, outer: PathBuf },
     #[error("{} and {} are one folder, or one lies in the other: results would be taken for drops", a.display(), b.display())]
     Mixed { a: PathBuf, b: PathBuf },
+    #[error("{} is shared by daemons that run; stop them, or add `shared = true` to the folder in the configuration of this one, too", root.display())]
+    Shared { root: PathBuf },
+    #[error("{}: this machine sees other numbers of files than the one that served it first, and jobs tell files by them; mount it so that the server's numbers are seen (SMB: `serverino`), or, if it was moved or restored since, remove {}", root.display(), noted.display())]
+    Numbers { root: PathBuf, noted: PathBuf },
     #[error("{}: does not answer: its server is gone or its disk hangs; see to its mount (`umount -f` gives it up)", root.display())]
     Silent { root: PathBuf },
     #[error("{0}")]
@@ -50,9 +57,9 @@ impl FolderError {
     /// Can the folder be served later, without anyone's change of the settings: when another daemon ends, or there is room again?
     pub(crate) fn passes(&self) -> bool {
         match self {
-            Self::Owned { .. } => true,
+            Self::Owned { .. } | Self::Shared { .. } => true,
             Self::Io { source, .. } => ErrorClass::of(source) == ErrorClass::Shortage,
-            Self::Within { .. } | Self::Mixed { .. } | Self::Silent { .. } | Self::Bucket(_) => false,
+            Self::Within { .. } | Self::Mixed { .. } | Self::Silent { .. } | Self::Bucket(_) | Self::Numbers { .. } => false,
         }
     }
 
@@ -134,14 +141,18 @@ impl Trace {
     }
 }
 
-/// A hot folder that was taken: it is this process's as long as this lives.
+/// A hot folder that was taken: it is served by this process as long as this lives.
 #[derive(Debug)]
 pub(crate) struct Ground {
     id: (u64, u64),
     /// File systems of the parts at the start.
     devices: [u64; PARTS.len()],
     trace: Trace,
-    lock: File,
+    lock: LockFile,
+    /// The lock is held.
+    keeps: bool,
+    /// Held with all that share the folder, or against them.
+    _shared: Option<LockFile>,
 }
 
 pub(crate) fn id(meta: &Metadata) -> (u64, u64) {
@@ -154,18 +165,33 @@ impl Ground {
     /// # Errors
     /// When another daemon serves it, or it cannot be made.
     pub(crate) fn take(root: &Path) -> Result<Self, FolderError> {
-        let io = |path: &Path, action| {
-            let path = path.to_owned();
-            move |source| FolderError::Io { path, action, source }
-        };
-        for part in PARTS {
-            let path = root.join(part);
-            make_folder(&path).map_err(io(&path, "cannot be made"))?;
-        }
+        make_parts(root)?;
         let lock = take_lock(root)?;
+        let shared = shared::alone(root)?;
         let pid = format!("{}\n", std::process::id());
         let path = root.join(PRIVATE).join(PID);
-        create::replace(&path, pid.as_bytes()).map_err(io(&path, "cannot be written"))?;
+        create::replace(&path, pid.as_bytes()).map_err(failed(&path, "cannot be written"))?;
+        Self::at(root, lock, true, shared)
+    }
+
+    /// Makes the parts that are missing, and serves the folder with others; see [`shared`]. Who keeps it is told by [`Ground::try_keep`].
+    ///
+    /// # Errors
+    /// When another daemon serves it alone, it cannot be made, or this machine sees other numbers of files.
+    pub(crate) fn visit(root: &Path) -> Result<Self, FolderError> {
+        make_parts(root)?;
+        let shared = shared::join(root)?;
+        let path = root.join(PRIVATE).join(LOCK);
+        let lock = LockFile::open(&path).map_err(failed(&path, "cannot be opened"))?;
+        // A number of a process says nothing on another machine.
+        let pid = root.join(PRIVATE).join(PID);
+        fsx::remove_if_there(&pid).map_err(failed(&pid, "cannot be removed"))?;
+        let ground = Self::at(root, lock, false, Some(shared))?;
+        shared::same_numbers(root)?;
+        Ok(ground)
+    }
+
+    fn at(root: &Path, lock: LockFile, keeps: bool, shared: Option<LockFile>) -> Result<Self, FolderError> {
         let id = id(&std::fs::metadata(root).map_err(FolderError::unseen(root))?);
         let mut devices = [id.0; PARTS.len()];
         for (device, part) in devices.iter_mut().zip(PARTS) {
@@ -174,9 +200,30 @@ impl Ground {
         }
         let mount = mount_of(root).map_err(FolderError::unseen(root))?;
         let path = root.join(PRIVATE).join(MARK);
-        let mark = mark(root, id).map_err(io(&path, "cannot be written"))?;
+        let mark = mark(root, id).map_err(failed(&path, "cannot be written"))?;
         let apart = PARTS.iter().zip(devices).filter(|(_, device)| *device != id.0).map(|(part, _)| (*part).to_owned());
-        Ok(Self { id, devices, trace: Trace { mark, mount, apart: apart.collect(), noted: None }, lock })
+        let trace = Trace { mark, mount, apart: apart.collect(), noted: None };
+        Ok(Self { id, devices, trace, lock, keeps, _shared: shared })
+    }
+
+    /// Does this daemon have the folder's lock?
+    pub(crate) fn keeps(&self) -> bool {
+        self.keeps
+    }
+
+    /// Takes the lock of a folder that is shared, if nobody has it.
+    ///
+    /// # Errors
+    /// When it cannot be locked.
+    pub(crate) fn try_keep(&mut self) -> io::Result<bool> {
+        if !self.keeps {
+            match self.lock.try_lock() {
+                Ok(()) => self.keeps = true,
+                Err(TryLockError::WouldBlock) => {}
+                Err(TryLockError::Error(error)) => return Err(error),
+            }
+        }
+        Ok(self.keeps)
     }
 
     /// What tells it again.
@@ -289,13 +336,9 @@ fn is_mount_root(path: &Path) -> io::Result<bool> {
 }
 
 /// The lock of the hot folder, which the system releases when the process ends.
-fn take_lock(root: &Path) -> Result<File, FolderError> {
+fn take_lock(root: &Path) -> Result<LockFile, FolderError> {
     let path = root.join(PRIVATE).join(LOCK);
-    let io = |action| {
-        let path = path.clone();
-        move |source| FolderError::Io { path, action, source }
-    };
-    let lock = create::lock_file(&path).map_err(io("cannot be opened"))?;
+    let lock = LockFile::open(&path).map_err(failed(&path, "cannot be opened"))?;
     let asked = Instant::now();
     loop {
         match lock.try_lock() {
@@ -309,7 +352,7 @@ fn take_lock(root: &Path) -> Result<File, FolderError> {
                 }
                 std::thread::sleep(Duration::from_millis(10));
             }
-            Err(TryLockError::Error(source)) => return Err(io("cannot be locked")(source)),
+            Err(TryLockError::Error(source)) => return Err(failed(&path, "cannot be locked")(source)),
         }
     }
 }
@@ -320,6 +363,19 @@ pub(crate) fn is_fading(pid: Option<u32>, asked: Instant) -> bool {
     let pid = pid.and_then(|pid| i32::try_from(pid).ok()).and_then(rustix::process::Pid::from_raw);
     let dead = pid.is_some_and(|pid| rustix::process::test_kill_process(pid) == Err(rustix::io::Errno::SRCH));
     dead && asked.elapsed() < Duration::from_secs(2)
+}
+
+fn failed(path: &Path, action: &'static str) -> impl FnOnce(io::Error) -> FolderError {
+    let path = path.to_owned();
+    move |source| FolderError::Io { path, action, source }
+}
+
+/// Makes the parts of a hot folder that are missing.
+fn make_parts(root: &Path) -> Result<(), FolderError> {
+    PARTS.iter().try_for_each(|part| {
+        let path = root.join(part);
+        make_folder(&path).map_err(failed(&path, "cannot be made"))
+    })
 }
 
 /// Makes the folder a path will stand in, durably where it is new.

@@ -8,13 +8,11 @@ use std::sync::{Arc, PoisonError};
 use std::time::{Duration, Instant, SystemTime};
 
 use crossbeam::channel::{Receiver, RecvTimeoutError};
-use suture_store::job::{Area, Kind};
-use suture_store::{Control, Job, JobId, Query, Role, StoreError, Submission, crash_point};
+use suture_store::{Control, Job, JobId, Role, Seen, StoreError, Submission, Submitted, crash_point};
 
 use crate::attempt::{Context, Event};
 use crate::event::Happening;
 use crate::folder::Folder;
-use crate::fsx;
 use crate::handed::{Handed, Untaken};
 use crate::hints::{Watching, watcher};
 use crate::orders::Orders;
@@ -32,6 +30,7 @@ mod news;
 mod once;
 mod reload;
 mod room;
+mod shared;
 
 use news::{Nights, Told};
 
@@ -78,6 +77,12 @@ struct Kept {
     looked: Instant,
     dirty: bool,
     unavailable: bool,
+    /// This daemon keeps it: it looks for drops, and does what one has to do alone.
+    is_kept: bool,
+    /// Of a shared one: when its lock was asked for last, all drops were looked at again, and it was cleared.
+    asked: Option<Instant>,
+    afresh: Option<Instant>,
+    cleared: Option<Instant>,
     told: Told,
     /// Files that were only noticed, and are gone.
     gone: Vec<JobId>,
@@ -104,6 +109,10 @@ impl Keeper {
                 looked: now,
                 dirty: true,
                 unavailable: false,
+                is_kept: false,
+                asked: None,
+                afresh: None,
+                cleared: None,
                 told: Told::default(),
                 gone: Vec::new(),
                 renamed: Vec::new(),
@@ -138,12 +147,7 @@ impl Keeper {
     pub(crate) fn begin(&mut self, raise: Raise) -> Result<(), StoreError> {
         self.look_at_clock();
         raise(self.context.settings.now().workers)?;
-        // All jobs are read for it, which is for nothing where drops are looked for elsewhere.
-        if !self.folders.is_empty() {
-            self.remember_live()?;
-            self.remember_past()?;
-            self.forget_noticed()?;
-        }
+        self.take_up(self.context.world.steady())?;
         if self.context.once {
             self.hasten_waiting()?;
         }
@@ -171,7 +175,9 @@ impl Keeper {
         }
         for handed in std::mem::take(&mut self.handed) {
             let Some(kept) = self.folders.iter_mut().find(|kept| kept.folder.name == handed.folder) else { continue };
-            if kept.folder.answers() != Answer::Yes {
+            if !kept.is_kept {
+                handed.answer(Err(Untaken::Unavailable(kept.elsewhere())));
+            } else if kept.folder.answers() != Answer::Yes {
                 let why = kept.folder.silence().unwrap_or_else(|| "the folder is slow to answer; try again".into());
                 handed.answer(Err(Untaken::Unavailable(why)));
             } else {
@@ -186,6 +192,7 @@ impl Keeper {
         if self.context.has(Role::Control) {
             self.nights.look(&self.context, now)?;
         }
+        self.take_up(now)?;
         for kept in &mut self.folders {
             kept.turn(&self.context, now)?;
         }
@@ -227,40 +234,6 @@ impl Keeper {
             }
             next = self.inbox.try_recv().map_err(|_| RecvTimeoutError::Timeout);
         }
-    }
-
-    /// Jobs of an earlier life whose files still wait in `in/`.
-    fn remember_live(&mut self) -> Result<(), StoreError> {
-        let kinds = Kind::ALL.into_iter().filter(|kind| kind.is_live()).collect();
-        for job in self.context.store.list(&Query { kinds, ..Query::default() })? {
-            if let Some(kept) = self.folders.iter_mut().find(|kept| kept.folder.name == job.source.folder)
-                && job.original().0 == Area::In
-            {
-                kept.reconciler.known(&job.source, job.id, Some(job.priority));
-            }
-        }
-        Ok(())
-    }
-
-    /// Orders of an earlier life, some of which may lack their summary; and originals that were left in their places, which the store knows by
-    /// their device, and that may be another one by now.
-    fn remember_past(&mut self) -> Result<(), StoreError> {
-        let (now, folders) = (self.context.world.steady(), &mut self.folders);
-        each_job(&*self.context.store, &mut |job| folders.iter_mut().for_each(|kept| kept.remember(job, now)))
-    }
-
-    /// Files that were noticed in an earlier life and are gone now.
-    fn forget_noticed(&self) -> Result<(), StoreError> {
-        for job in self.context.store.list(&Query { kinds: vec![Kind::Noticed], ..Query::default() })? {
-            if let Some(kept) = self.folders.iter().find(|kept| kept.folder.name == job.source.folder)
-                && kept.folder.check().is_ok()
-                && fsx::is_folder(&kept.folder.inbox()).is_ok_and(|there| there)
-                && fsx::exists(&kept.folder.inbox().join(job.source.path.to_path())).is_ok_and(|there| !there)
-            {
-                control(&self.context, job.id, Control::Forget)?;
-            }
-        }
-        Ok(())
     }
 
     /// As many slots work as there are to be workers; outside of the hours of work few, or none.
@@ -331,6 +304,9 @@ impl Kept {
 
     fn scan(&mut self, context: &Context, now: Instant) -> Result<(), StoreError> {
         let mut here = self.folder.check().or_else(|_| self.folder.regain());
+        if !self.is_kept {
+            return self.visit(context, now, here);
+        }
         if here.is_ok() {
             here = match self.recall(context, now) {
                 Err(PublishError::Store(error)) => return Err(error),
@@ -343,13 +319,17 @@ impl Kept {
             Err(error) => return self.tell_away(context, now, error),
         };
         self.looked_at(context, now, self.reconciler.left_out());
+        self.is_back(context);
+        self.gone.extend(gone);
+        self.watch(context);
+        self.told.tell(context, &self.folder.name, None)
+    }
+
+    fn is_back(&mut self, context: &Context) {
         if std::mem::take(&mut self.unavailable) {
             let (name, root) = (&self.folder.name, &self.folder.root);
             context.bus.tell(&Happening::FolderBack { name, root });
         }
-        self.gone.extend(gone);
-        self.watch(context);
-        self.told.tell(context, &self.folder.name, None)
     }
 
     /// The folder is out of reach for this reason.
@@ -359,7 +339,9 @@ impl Kept {
             let (name, root) = (&self.folder.name, &self.folder.root);
             context.bus.tell(&Happening::FolderAway { name, root, why: &why });
         }
-        self.told.tell(context, &self.folder.name, Some(&why))?;
+        if self.is_kept {
+            self.told.tell(context, &self.folder.name, Some(&why))?;
+        }
         self.looked_at(context, now, vec![why]);
         Ok(())
     }
@@ -433,22 +415,14 @@ impl Kept {
         match context.store.submit(&found) {
             Ok(submitted) => {
                 crash_point("daemon.submitted");
-                for ((path, submission), answer) in paths.iter().zip(&found).zip(submitted) {
-                    self.orders.came(&submission.source.path, answer.id, now);
-                    self.reconciler.submitted(path, submission, answer);
-                }
+                self.answered(context, now, paths, found, submitted)?;
             }
             Err(StoreError::TooLong { .. }) => {
                 // One by one, to find out which.
-                for (path, submission) in paths.iter().zip(&found) {
-                    match context.store.submit(std::slice::from_ref(submission)) {
-                        Ok(answer) => {
-                            for answer in answer {
-                                self.orders.came(&submission.source.path, answer.id, now);
-                                self.reconciler.submitted(path, submission, answer);
-                            }
-                        }
-                        Err(error) if error.is_callers() => self.reconciler.refused(path, &error.to_string()),
+                for (path, submission) in paths.into_iter().zip(found) {
+                    match context.store.submit(std::slice::from_ref(&submission)) {
+                        Ok(answer) => self.answered(context, now, vec![path], vec![submission], answer)?,
+                        Err(error) if error.is_callers() => self.reconciler.refused(&path, &error.to_string()),
                         Err(error) => return Err(error),
                     }
                 }
@@ -457,6 +431,28 @@ impl Kept {
         }
         context.schedule.news();
         Ok(())
+    }
+
+    /// Of a file that a worker on another machine moved while it was looked at no second job is made: it is new only if it is still there.
+    fn answered(
+        &mut self,
+        context: &Context,
+        now: Instant,
+        paths: Vec<PathBuf>,
+        found: Vec<Submission>,
+        answers: Vec<Submitted>,
+    ) -> Result<(), StoreError> {
+        let mut again = Vec::new();
+        for ((path, submission), answer) in paths.into_iter().zip(found).zip(answers) {
+            if answer.ended {
+                again.push((path, Submission { seen: Seen::After(Some(answer.id)), ..submission }));
+            } else {
+                self.orders.came(&submission.source.path, answer.id, now);
+                self.reconciler.submitted(&path, &submission, answer);
+            }
+        }
+        let again = self.reconciler.there_still(again);
+        if again.is_empty() { Ok(()) } else { self.submit(context, now, again) }
     }
 }
 

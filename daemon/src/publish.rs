@@ -18,7 +18,7 @@ use suture_core::report::Outcome;
 use suture_store::job::Withdrawal;
 use suture_store::{Claim, Ending, Hash, Job, JobStore, Publication, State, Step, crash_point};
 
-use crate::claim::{CLAIMED, Original, is_source};
+use crate::claim::{CLAIMED, Original, is_inode, is_source};
 use crate::create;
 use crate::folder::{Folder, make_parent};
 use crate::fsx::{self, Identity};
@@ -214,6 +214,7 @@ impl<'a> Desk<'a> {
         // What this claim has written itself, it need not read again.
         let trusted = job.hold().is_some_and(|hold| job.work == Some(hold.token));
         for (i, piece) in pieces.iter().enumerate() {
+            self.must_hold_shared()?;
             make_parent(&piece.to).map_err(io_at(&piece.to))?;
             let item = Item { from: &piece.from, to: &piece.to, stage: &piece.stage };
             if let Some(source) = item.source().map_err(io_at(&piece.from))? {
@@ -278,8 +279,7 @@ impl<'a> Desk<'a> {
         let Some(ctime) = p.source_ctime_ns else { return Ok(true) };
         let (area, path) = job.original();
         let names = [self.folder.area(area).join(path.to_path()), self.work(job).join(CLAIMED)];
-        let inode = (job.source.dev, job.source.ino);
-        let is_original = |found: &Identity| job.moved_to.is_some() || (found.dev, found.ino) == inode;
+        let is_original = |found: &Identity| job.moved_to.is_some() || is_inode(found, &job.source);
         for path in &names {
             match fsx::look(path).map_err(io_at(path))?.filter(is_original) {
                 Some(found) if found.ctime_ns == ctime => return Ok(true),
@@ -338,6 +338,7 @@ impl<'a> Desk<'a> {
             return self.intend_durably(job, publication);
         }
         let names = self.names(job, old.ending, ending.as_deref())?;
+        self.must_hold_shared()?;
         let work = self.work(job);
         let path = work.join(REPORT_FILE);
         let mut report = match read_json(&path) {
@@ -387,6 +388,7 @@ impl<'a> Desk<'a> {
         let area = self.folder.area(publication.ending.area());
         let to = area.join(wanted.to_path());
         if from != to {
+            self.must_hold_shared()?;
             make_parent(&to).map_err(io_at(&to))?;
             let claimed = self.work(job).join(CLAIMED);
             let way = Move { job, work: job.work_token(), from: &from, to: &to, claimed: &claimed };

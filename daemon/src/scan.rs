@@ -13,7 +13,7 @@ use std::time::Instant;
 use suture_store::{JobId, Priority, RelPath, Seen, Source, Submission, Submitted};
 
 use crate::choice;
-use crate::claim::Original;
+use crate::claim::{Original, is_inode};
 use crate::folder::Folder;
 use crate::force;
 use crate::fsx::{self, Identity};
@@ -184,7 +184,7 @@ impl Reconciler {
                     let source = self.source(name, &identity);
                     let own = || choice::priority(&self.settings.now(), &self.folder, &source.path, &source.profile);
                     let priority = companion.unwrap_or_else(own);
-                    submissions.push((path, Submission { source, foreign, priority, seen: Seen::Now }));
+                    submissions.push((path, Submission { source, foreign, priority, seen: self.seen() }));
                 }
                 Err(error) => self.give_up(&path, identity, &error.to_string()),
             }
@@ -328,6 +328,17 @@ impl Reconciler {
         std::mem::take(&mut self.waits_changed)
     }
 
+    /// Of these submissions, the jobs of which had ended and may have moved the files: those whose files are there still, to be submitted once more.
+    pub(crate) fn there_still(&self, found: Vec<(PathBuf, Submission)>) -> Vec<(PathBuf, Submission)> {
+        // What cannot be looked at settles further, and is submitted then.
+        found.into_iter().filter(|(_, submission)| self.is_there(&submission.source).unwrap_or(false)).collect()
+    }
+
+    /// Everything is to be looked at again: jobs may have ended elsewhere of which this daemon heard nothing.
+    pub(crate) fn look_afresh(&mut self) {
+        self.entries.retain(|_, entry| !matches!(entry, Entry::Submitted { foreign: false, .. }));
+    }
+
     /// A job answers for a file now.
     pub(crate) fn submitted(&mut self, path: &Path, submission: &Submission, answer: Submitted) {
         let Some(entry) = self.entries.get_mut(path) else { return };
@@ -359,7 +370,12 @@ impl Reconciler {
         };
         let source = self.source(handed.path.clone(), &identity);
         let priority = choice::priority(&self.settings.now(), &self.folder, &source.path, &source.profile);
-        Ok(Submission { source, foreign: None, priority, seen: Seen::Now })
+        Ok(Submission { source, foreign: None, priority, seen: self.seen() })
+    }
+
+    /// A worker on another machine may move what lies on a share at any time.
+    fn seen(&self) -> Seen {
+        if self.folder.is_shared { Seen::After(None) } else { Seen::Now }
     }
 
     /// Does this very file lie where it was dropped?
@@ -367,9 +383,10 @@ impl Reconciler {
     /// # Errors
     /// When that cannot be told: an error is no absence.
     pub(crate) fn is_there(&self, source: &Source) -> io::Result<bool> {
-        let found = fsx::look(&self.folder.inbox().join(source.path.to_path()))?;
-        let Source { dev, ino, size, mtime_ns, .. } = *source;
-        Ok(found.is_some_and(|found| found.same_content(&Identity { dev, ino, size, mtime_ns, ctime_ns: 0 })))
+        let path = self.folder.inbox().join(source.path.to_path());
+        self.folder.look_anew(fsx::folder_of(&path));
+        let is_same = |found: &Identity| (found.size, found.mtime_ns) == (source.size, source.mtime_ns);
+        Ok(fsx::look(&path)?.is_some_and(|found| is_inode(&found, source) && is_same(&found)))
     }
 
     /// The store cannot hold a record of this file; it stays where it is, and is named once.
@@ -430,7 +447,7 @@ impl Reconciler {
         Source {
             folder: self.folder.name.clone(),
             path,
-            dev: identity.dev,
+            dev: self.folder.noted_device(identity.dev),
             ino: identity.ino,
             size: identity.size,
             mtime_ns: identity.mtime_ns,

@@ -11,7 +11,7 @@ use crate::bucket::address::BucketAddress;
 use crate::cli::WatchArgs;
 use crate::config::api::Api;
 use crate::config::taken::OnTaken;
-use crate::config::{BucketConfig, Config, FolderConfig, read, real, roles, show};
+use crate::config::{BucketConfig, Config, FolderConfig, read, real, roles, share, show};
 use crate::signals::Hangup;
 
 /// The configuration in force, and where it comes from.
@@ -96,6 +96,7 @@ fn from_args(args: &WatchArgs) -> Result<Config, String> {
     config.roles = args.roles.unwrap_or(config.roles);
     config.check_memory()?;
     roles::check(&config)?;
+    share::check(&config)?;
     if args.once && !config.roles.are_all() {
         return Err(format!(
             "--once waits for the end of all work, which a daemon with the roles {} leaves to others; leave it out",
@@ -129,8 +130,10 @@ fn fixed(old: &Config, new: &Config) -> Vec<String> {
     if old.api != new.api {
         fixed.push("`[api]`".to_owned());
     }
-    let places = |config: &Config| -> BTreeMap<String, (PathBuf, Option<BucketConfig>, bool, OnTaken)> {
-        let of = |folder: &FolderConfig| (real(&folder.path), folder.bucket.clone(), folder.leave_originals, folder.on_taken);
+    let places = |config: &Config| -> BTreeMap<String, (PathBuf, Option<BucketConfig>, [bool; 2], OnTaken)> {
+        let of = |folder: &FolderConfig| {
+            (real(&folder.path), folder.bucket.clone(), [folder.is_shared, folder.leave_originals], folder.on_taken)
+        };
         config.folders.iter().map(|folder| (folder.name.clone(), of(folder))).collect()
     };
     let (was, is) = (places(old), places(new));

@@ -11,7 +11,8 @@ use std::sync::Arc;
 use suture_store::transfer::SharedStore;
 use suture_store::{Address, JobStore, Opening, SledStore, StateLock, Station, StoreError};
 
-use crate::config::{Config, real};
+use crate::config::{Config, default_state, real};
+use crate::folder::make_parent;
 use crate::{create, fsx};
 
 /// The store of a daemon that runs.
@@ -100,6 +101,19 @@ pub(crate) fn noted(state: &Path) -> io::Result<Option<String>> {
     Ok(bytes.map(|bytes| OsString::from_vec(bytes).to_string_lossy().trim().to_owned()))
 }
 
+/// Notes in a folder that daemons on several machines serve where its jobs are.
+///
+/// # Errors
+/// When that cannot be written.
+pub(crate) fn note_in_folder(root: &Path, address: Option<&Address>) -> io::Result<()> {
+    let state = default_state(root);
+    if noted(&state)? == address.map(ToString::to_string) {
+        return Ok(());
+    }
+    make_parent(&note_in(&state))?;
+    note(&state, address)
+}
+
 /// Notes that the jobs are there, or in the folder itself.
 ///
 /// # Errors
@@ -115,8 +129,8 @@ pub(crate) fn note(state: &Path, address: Option<&Address>) -> io::Result<()> {
 fn connect(address: &Address, config: &Config) -> Result<Arc<dyn JobStore>, StoreError> {
     use suture_store::{PostgresStore, Shared};
     let folders = Some(config.folders.iter().map(|folder| folder.name.clone()).collect());
-    // What lies in a bucket lies on no machine more than on another.
-    let joint = config.folders.iter().filter(|folder| folder.bucket.is_some()).map(|folder| folder.name.clone()).collect();
+    // What lies in a bucket, or on a share, lies on no machine more than on another.
+    let joint = config.folders.iter().filter(|folder| folder.is_for_many()).map(|folder| folder.name.clone()).collect();
     let new = Shared::new(address.exposed(), &daemon_name(&config.state));
     Ok(Arc::new(PostgresStore::open(&Shared { folders, joint, station: station(config), ..new })?))
 }

@@ -47,7 +47,7 @@ mod recover;
 mod threads;
 
 use notes::{note_folders, note_state};
-pub(crate) use recover::recover;
+pub(crate) use recover::{clear, recover};
 use threads::{Slots, guarded, no_thread, thread};
 
 /// How often what is gone is looked for.
@@ -84,8 +84,10 @@ pub(crate) fn serve(settings: Settings, once: bool, stop: &Stop, may_begin_anew:
         Err(error) => {
             complain(&error);
             return match &error {
-                FolderError::Owned { .. } => Exit::Owned,
-                FolderError::Within { .. } | FolderError::Mixed { .. } | FolderError::Bucket(_) => Exit::Refused,
+                FolderError::Owned { .. } | FolderError::Shared { .. } => Exit::Owned,
+                FolderError::Within { .. } | FolderError::Mixed { .. } | FolderError::Bucket(_) | FolderError::Numbers { .. } => {
+                    Exit::Refused
+                }
                 FolderError::Silent { .. } => Exit::TryAgain,
                 FolderError::Io { source, .. } => Exit::of_start(source),
             };
@@ -356,9 +358,10 @@ impl Daemon {
         };
         if context.has(Role::Control) {
             thread("deliver").spawn_scoped(scope, tell).map(drop).map_err(no_thread)?;
-            if !self.once {
-                thread("sweeper").spawn_scoped(scope, sweep).map(drop).map_err(no_thread)?;
-            }
+        }
+        let may_keep = context.has(Role::Intake) && self.folders.iter().any(|folder| folder.is_shared);
+        if !self.once && (context.has(Role::Control) || may_keep) {
+            thread("sweeper").spawn_scoped(scope, sweep).map(drop).map_err(no_thread)?;
         }
         Ok(())
     }
@@ -425,7 +428,7 @@ pub(crate) fn look_for_pause(context: &Context) {
 fn answer_at(folder: &Folder, context: &Context, ended: &dyn Fn() -> bool) {
     let mut told = false;
     while !ended() {
-        let door = folder.check().ok().map(|()| Door::open(&folder.root));
+        let door = folder.check().ok().filter(|()| folder.keeps()).map(|()| Door::open(&folder.root));
         match door {
             Some(Ok(door)) => {
                 // Again: whoever found no door has noted the pause before this look, or is answered.

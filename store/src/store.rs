@@ -37,7 +37,7 @@ pub trait JobStore: Send + Sync {
     /// Store errors only.
     fn claim(&self, want: &Filter) -> Result<Option<Claim>, StoreError>;
 
-    /// Will the next claim give a parked job, whatever is wanted?
+    /// Will the next claim give a parked job, or look for what a dead daemon held, whatever is wanted?
     ///
     /// # Errors
     /// Store errors only.
@@ -425,7 +425,7 @@ pub enum StoreError {
     /// Another daemon tells of the events of a hot folder, and serves other folders than this one.
     #[error(
         "the events of the folder `{folder}` are told by another daemon, {by}, which serves other folders than this one: have daemons with the \
-         role `control` name the same folders, all of them in buckets, or folders of their own"
+         role `control` name the same folders, all of them in buckets or on shares, or folders of their own"
     )]
     Told { folder: String, by: String },
 

@@ -13,6 +13,8 @@ mod deaths;
 mod lost;
 #[path = "crash/sampled.rs"]
 mod sampled;
+#[path = "crash/share.rs"]
+mod share;
 #[path = "crash/shared.rs"]
 mod shared;
 #[path = "crash/taken.rs"]

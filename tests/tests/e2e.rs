@@ -44,6 +44,7 @@ mod e2e {
     mod same_bytes;
     mod service;
     mod shaping;
+    mod shares;
     mod soups;
     mod specials;
     mod steer;

@@ -13,14 +13,12 @@ use toml::Spanned;
 
 use super::apart::apart;
 use super::api::Api;
-use super::bucket;
 use super::events::{self, OnDoneFile, WebhookFile};
 use super::keep::{Bound, Keep};
-use super::roles;
 use super::sampling::OneIn;
 use super::shared::StoreFile;
 use super::taken::OnTaken;
-use super::{AUTO, Config, DEFAULT_PROFILE, FolderConfig, name_of, real};
+use super::{AUTO, Config, DEFAULT_PROFILE, FolderConfig, bucket, name_of, real, roles, share};
 use crate::own_profile::OwnProfile;
 use crate::profiles::{self, place_of, with_line};
 use crate::units::{parse_duration, parse_listen, parse_size};
@@ -84,6 +82,9 @@ struct FolderFile {
     on_taken: OnTaken,
     /// Of one in a bucket: bytes of drops that are kept on this machine.
     cache: Option<Size>,
+    /// Daemons on other machines serve it, too.
+    #[serde(default)]
+    shared: bool,
 }
 
 #[derive(Debug, Deserialize)]
@@ -225,7 +226,7 @@ pub(crate) fn whole(path: &Path) -> Result<Config, String> {
         let at = ["memory", "workers"].map(|setting| place_of(&text, 0, setting)).into_iter().max().unwrap_or(0);
         format!("{}: {}", path.display(), with_line(&text, at, &what))
     })?;
-    roles::check(&config).map_err(|what| {
+    roles::check(&config).and_then(|()| share::check(&config)).map_err(|what| {
         let text = std::fs::read_to_string(path).unwrap_or_default();
         format!("{}: {}", path.display(), with_line(&text, place_of(&text, 0, "roles"), &what))
     })?;
@@ -242,6 +243,7 @@ fn from_text(text: &str) -> Result<Config, String> {
     config.folders = folders(text, &file.folders, &config)?;
     for (folder, of_file) in config.folders.iter_mut().zip(&file.folders) {
         let placed = bucket::place(folder, of_file.cache.as_ref().map(|size| size.0), file.state.as_deref());
+        let placed = placed.and_then(|()| share::place(folder, of_file.shared, file.state.as_deref()));
         placed.map_err(|what| with_line(text, of_file.path.span().start, &what))?;
     }
     config.state = file.state.unwrap_or(config.state);
@@ -352,9 +354,8 @@ fn folders(text: &str, of_file: &[FolderFile], config: &Config) -> Result<Vec<Fo
             return Err(with_line(text, named.span().start, &what));
         }
         let (leave_originals, priority, on_taken) = (folder.leave_originals, folder.priority, folder.on_taken);
-        let (path, profile) = (path.clone(), profile.to_owned());
-        let share = Share { weight: folder.share, most_running: folder.most_running };
-        folders.push(FolderConfig { name, path, bucket: None, profile, leave_originals, priority, share, on_taken });
+        let (profile, share) = (profile.to_owned(), Share { weight: folder.share, most_running: folder.most_running });
+        folders.push(FolderConfig { name, profile, leave_originals, priority, share, on_taken, ..FolderConfig::of(path) });
     }
     apart(&folders).map_err(|(folder, what)| {
         let at = of_file.get(folder).map_or(0, |folder| folder.path.span().start);

@@ -13,10 +13,10 @@ pub(crate) fn check(config: &Config) -> Result<(), String> {
         return Ok(());
     }
     let roles = config.roles;
-    if let Some(near) = config.folders.iter().find(|folder| folder.bucket.is_none()) {
+    if let Some(near) = config.folders.iter().find(|folder| !folder.is_for_many()) {
         return Err(format!(
             "the folder `{}` lies on this machine, and is served by one daemon with all roles; this one has {roles} alone: serve folders in \
-             buckets (`path = \"s3://…\"`), or leave the roles out",
+             buckets (`path = \"s3://…\"`) or on a share (`shared = true`), or leave the roles out",
             near.name
         ));
     }

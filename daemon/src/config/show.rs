@@ -105,7 +105,9 @@ pub(crate) fn text(config: &Config) -> Result<String, String> {
     // Without the password: such a text is shown to people.
     text += &format!("roles = [{}]\n", config.roles.each().map(|role| quoted(role.name())).collect::<Vec<_>>().join(", "));
     text += &config.store.as_ref().map(|store| format!("store = {}\n", quoted(&store.to_string()))).unwrap_or_default();
-    for FolderConfig { name, path: root, bucket, profile, leave_originals, priority, share, on_taken } in &config.folders {
+    for FolderConfig { name, path: root, bucket, is_shared, profile, leave_originals, priority, share, on_taken } in
+        &config.folders
+    {
         text += &format!(
             "\n[[folders]]\npath = {}\nname = {}\nprofile = {}\n",
             bucket.as_ref().map_or_else(|| path(root), |bucket| quoted(&bucket.address.to_string())),
@@ -116,6 +118,7 @@ pub(crate) fn text(config: &Config) -> Result<String, String> {
         text += &share.most_running.map(|most| format!("most_running = {most}\n")).unwrap_or_default();
         text += &format!("on_taken = {}\n", quoted(on_taken.name()));
         text += &bucket.as_ref().map(|bucket| format!("cache = {}\n", quoted(&write_size(bucket.cache)))).unwrap_or_default();
+        text += if *is_shared { "shared = true\n" } else { "" };
     }
     text += &told(&config.events);
     if !config.profiles.is_empty() {
@@ -221,6 +224,7 @@ mod tests {
             name: "scans & more".into(),
             path: "scans".into(),
             bucket: None,
+            is_shared: true,
             profile: "it's mine".into(),
             leave_originals: true,
             priority: Priority::HIGHEST,

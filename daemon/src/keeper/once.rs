@@ -6,7 +6,7 @@ use std::sync::atomic::Ordering;
 use suture_store::job::Kind;
 use suture_store::{Job, Query, StoreError};
 
-use super::Keeper;
+use super::{Keeper, Kept};
 use crate::folder::is_meant;
 
 /// A result that cannot be brought into place is tried so often before it is left for the next run.
@@ -17,7 +17,8 @@ const QUEUED: [Kind; 2] = [Kind::Queued, Kind::Alone];
 impl Keeper {
     /// With `--once`: is everything that came to rest finished?
     pub(super) fn is_finished(&self) -> Result<bool, StoreError> {
-        let folders_rest = self.folders.iter().all(|kept| !kept.dirty && (kept.unavailable || !kept.reconciler.is_settling()));
+        let rests = |kept: &Kept| !kept.dirty && (kept.unavailable || !kept.reconciler.is_settling());
+        let folders_rest = self.folders.iter().all(rests);
         let buckets = self.context.folders.iter().filter_map(|folder| folder.bucket.as_ref());
         let were_polled = buckets.into_iter().all(|shelf| shelf.was_polled.load(Ordering::Acquire));
         let counts = self.context.store.counts()?;

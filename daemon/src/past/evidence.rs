@@ -163,7 +163,7 @@ impl Evidence<'_> {
         let source = Source {
             folder: self.folder.name.clone(),
             path: told.source.clone()?,
-            dev: found.map_or(0, |found| found.dev),
+            dev: found.map_or(0, |found| self.folder.noted_device(found.dev)),
             ino: found.map_or(0, |found| found.ino),
             size: told.source_bytes,
             mtime_ns: found.map(|found| found.mtime_ns).or(told.source_mtime_ns).unwrap_or(0),

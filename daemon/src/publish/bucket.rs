@@ -68,6 +68,15 @@ impl Desk<'_> {
         }
     }
 
+    /// The same of a folder that daemons on other machines serve, too: one of them may have the job by now. On a machine of its own a claim is lost by no
+    /// pause, however long.
+    ///
+    /// # Errors
+    /// As [`Desk::must_hold`].
+    pub(super) fn must_hold_shared(&self) -> Result<(), PublishError> {
+        if self.folder.is_shared { Ok(self.must_hold()?) } else { Ok(()) }
+    }
+
     fn key(&self, path: &Path) -> Result<String, PublishError> {
         Shelf::key(&self.folder.root, path).map_err(io_at(path))
     }

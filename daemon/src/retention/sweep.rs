@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use suture_store::job::{Area, Kind};
-use suture_store::{Job, JobStore, Query, StoreError, Time};
+use suture_store::{Job, JobStore, Query, Role, StoreError, Time};
 
 use super::archive::{Archive, Stays, give_back};
 use super::history::past;
@@ -92,7 +92,7 @@ impl Sweeper {
     /// not: at once, since no one else would find them.
     fn set_right(&mut self) {
         for folder in &self.folders {
-            if self.righted.contains(&folder.name) || folder.check().is_err() {
+            if self.righted.contains(&folder.name) || !folder.keeps() || folder.check().is_err() {
                 continue;
             }
             // What cannot be done now is tried at the next look.
@@ -112,6 +112,9 @@ impl Sweeper {
 
     fn forget(&self, keep: &Keep, now: Time) -> Result<u64, StoreError> {
         let mut forgotten = 0;
+        if !self.settings.now().roles.has(Role::Control) {
+            return Ok(forgotten);
+        }
         for past in past(&*self.store, keep, now, &|job| self.is_needed(job))? {
             let jobs = self.store.forget(&past.ids)?;
             tracing::info!(jobs, reason = past.why, "Old jobs are forgotten; their files stay as they are.");
@@ -128,8 +131,8 @@ impl Sweeper {
         // Of this sweep to its end, whatever is read meanwhile.
         let keep = self.settings.now().keep.clone();
         let (mut swept, busy, said) = (Swept::default(), self.busy()?, std::mem::take(&mut self.told));
-        for folder in self.folders.clone() {
-            if let Err(line) = self.files(&folder, &keep, now, &busy, stop, &mut swept) {
+        for folder in self.folders.clone().iter().filter(|folder| folder.keeps()) {
+            if let Err(line) = self.files(folder, &keep, now, &busy, stop, &mut swept) {
                 if !said.contains(&line) {
                     tracing::warn!(folder = %folder.root.display(), reason = line, "Retention: nothing more goes for now.");
                 }

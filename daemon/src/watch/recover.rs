@@ -1,12 +1,14 @@
 //! What an earlier life left: its jobs are taken up, and its work folders cleared away. Jobs are held by workers alone.
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use suture_store::job::{Kind, Testimony};
-use suture_store::{Query, StoreError, crash_point};
+use suture_store::{Job, Query, StoreError, crash_point};
 
 use crate::attempt::{Context, IN_HAND, Slot, WITNESS, remove_work};
 use crate::event::{Happening, Recovery};
+use crate::folder::Folder;
 use crate::publish_error::PublishError;
 use crate::schedule::Turn;
 use crate::{fsx, uploads};
@@ -15,7 +17,7 @@ use crate::{fsx, uploads};
 pub(crate) fn recover(context: &Arc<Context>) -> Result<(), StoreError> {
     // What lies in a folder that is another daemon's for now tells nothing of this one's jobs.
     let folder = |name: &str| context.folders.iter().find(|folder| folder.name == name && folder.check().is_ok());
-    let testimony = |job: &suture_store::Job| {
+    let testimony = |job: &Job| {
         let work = job.work.and_then(|work| Some(folder(&job.source.folder)?.work(work)));
         let there = |name: &str| work.as_ref().is_some_and(|work| fsx::exists(&work.join(name)).unwrap_or(false));
         match () {
@@ -39,33 +41,41 @@ pub(crate) fn recover(context: &Arc<Context>) -> Result<(), StoreError> {
         }
     }
     // Before anything is cleared away: what is under way is known by its work folder.
-    for folder in context.folders.iter().filter(|folder| folder.check().is_ok()) {
+    for folder in context.folders.iter().filter(|folder| folder.keeps() && folder.check().is_ok()) {
         match context.unread.read(&*context.store, folder, &context.bus) {
             Err(PublishError::Store(error)) => return Err(error),
             Err(error) => tracing::error!(%error, "What an earlier job store left cannot be read; it is tried again."),
             Ok(_) => {}
         }
     }
-    let held: Vec<_> = context
-        .store
-        .list(&Query {
-            kinds: Kind::ALL.into_iter().filter(|kind| kind.is_held() || *kind == Kind::Parked).collect(),
-            ..Query::default()
-        })?
+    // What lies in a folder that others serve, too, is cleared away by whoever keeps it.
+    context
+        .folders
         .iter()
-        .filter_map(|job| job.work.map(|token| token.to_string()))
-        .collect();
-    for folder in context.folders.iter().filter(|folder| folder.check().is_ok()) {
-        uploads::clear(folder);
-        if context.unread.has(folder) {
-            continue;
-        }
-        // Without jobs under claim, every folder in there is a left-over.
-        for entry in std::fs::read_dir(folder.work_root()).into_iter().flatten().flatten() {
-            if !held.iter().any(|token| entry.file_name().to_str() == Some(token)) {
-                remove_work(&entry.path());
-            }
-        }
+        .filter(|folder| !folder.is_shared && folder.check().is_ok())
+        .try_for_each(|folder| clear(context, folder))
+}
+
+/// Clears away what no job has in work, in a folder that this daemon keeps.
+///
+/// # Errors
+/// When the store failed.
+pub(crate) fn clear(context: &Context, folder: &Folder) -> Result<(), StoreError> {
+    uploads::clear(folder);
+    if context.unread.has(folder) {
+        return Ok(());
+    }
+    // In this order: a work folder is made after its claim, by whatever machine, so that each of a job under claim is among those listed then.
+    let found: Vec<_> = std::fs::read_dir(folder.work_root()).into_iter().flatten().flatten().collect();
+    if found.is_empty() {
+        return Ok(());
+    }
+    let kinds = Kind::ALL.into_iter().filter(|kind| kind.is_held() || *kind == Kind::Parked).collect();
+    let jobs = context.store.list(&Query { kinds, ..Query::default() })?;
+    let tokens = |job: &Job| [job.work, job.hold().map(|hold| hold.token)];
+    let held: BTreeSet<String> = jobs.iter().flat_map(tokens).flatten().map(|token| token.to_string()).collect();
+    for entry in found.iter().filter(|entry| !entry.file_name().to_str().is_some_and(|name| held.contains(name))) {
+        remove_work(&entry.path());
     }
     Ok(())
 }

@@ -123,7 +123,11 @@ fn folder_of(context: &Context, name: Option<&str>) -> Result<Arc<Folder>, Probl
     };
     let folder = found.cloned().ok_or_else(|| Problem::bad(format!("`folder` must be one of {}", names())))?;
     match &folder.bucket {
-        None => Ok(folder),
+        None if folder.keeps() => Ok(folder),
+        None => {
+            let inbox = folder.inbox();
+            Err(Problem::bad(format!("another daemon looks for drops in the folder: put the file into {}", inbox.display())))
+        }
         Some(shelf) => {
             Err(Problem::bad(format!("the folder lies in a bucket: put the file into {}/in/", shelf.bucket.address())))
         }

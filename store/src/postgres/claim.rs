@@ -250,7 +250,8 @@ pub(super) fn inherit(
 
 /// As [`crate::JobStore::has_parked`].
 pub(super) async fn has_parked(connection: &mut PgConnection, life: &Life, shut: &[String]) -> Result<bool, Failure> {
-    Ok(sqlx::query(HAS_PARKED).bind(shut).bind(&life.folders).fetch_one(connection).await?.try_get("has")?)
+    let query = sqlx::query(HAS_PARKED).bind(shut).bind(&life.folders).bind(life.lease).bind(int(life.epoch.0));
+    Ok(query.fetch_one(connection).await?.try_get("has")?)
 }
 
 /// As [`crate::JobStore::waiting`].

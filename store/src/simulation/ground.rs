@@ -29,6 +29,8 @@ pub(super) enum Flaw {
     Boundless,
     /// A submission is acknowledged, and now and then forgotten.
     Forgetful,
+    /// That a lease has run out is told to nobody who asks whether there is something to claim.
+    Silent,
 }
 
 /// A store that several daemons share.
@@ -43,6 +45,8 @@ pub(super) trait Ground {
 pub(super) trait Seat {
     /// All that is the same for every life.
     fn store(&self, call: &mut dyn FnMut(&dyn JobStore));
+    /// Is a claim worth the asking? A daemon with nothing else to do asks this first.
+    fn has(&self, want: &Filter) -> Result<bool, StoreError>;
     fn claim(&self, want: &Filter) -> Result<Option<Claim>, StoreError>;
     fn heartbeat(&self, claim: &Claim) -> Result<Lease, StoreError>;
     fn advance(&self, claim: &Claim, step: Step) -> Result<Job, StoreError>;
@@ -175,6 +179,13 @@ impl InMemorySeat {
 impl Seat for InMemorySeat {
     fn store(&self, call: &mut dyn FnMut(&dyn JobStore)) {
         self.inner.queue(|queue| call(queue));
+    }
+
+    fn has(&self, want: &Filter) -> Result<bool, StoreError> {
+        let now = self.inner.now();
+        let is_left = self.inner.beside().held.values().any(|held| held.until <= now);
+        let waits = self.inner.queue(|queue| Ok::<_, StoreError>(queue.has_parked()? || queue.waiting(want)?.is_some()))?;
+        Ok(waits || (is_left && self.inner.flaw != Flaw::Silent))
     }
 
     fn claim(&self, want: &Filter) -> Result<Option<Claim>, StoreError> {

@@ -17,6 +17,10 @@ impl Seat for PostgresStore {
         call(self);
     }
 
+    fn has(&self, want: &Filter) -> Result<bool, StoreError> {
+        Ok(JobStore::has_parked(self)? || JobStore::waiting(self, want)?.is_some())
+    }
+
     fn claim(&self, want: &Filter) -> Result<Option<Claim>, StoreError> {
         JobStore::claim(self, want)
     }

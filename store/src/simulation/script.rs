@@ -168,7 +168,7 @@ impl Stage {
 
     /// A store that forgets what it was told of shares is told again, by whoever lives; turns begin anew.
     fn again_shares(&mut self) {
-        if self.has_short_memory {
+        if self.is_in_memory {
             self.oracle.forget_turns();
             if let Some(seat) = self.hosts.iter().find_map(|host| host.seat.clone()) {
                 self.say_shares(&*seat);

@@ -89,8 +89,8 @@ pub(super) struct Stage {
     pub is_calm: bool,
     /// Until then the database is away.
     pub away_until: u64,
-    /// Whether the store forgets turns where it goes down.
-    pub has_short_memory: bool,
+    /// Tables in memory: the store forgets turns where it goes down, and knows no sign of life but those of the farm.
+    pub is_in_memory: bool,
     log: VecDeque<String>,
     digest: u64,
 }
@@ -103,7 +103,7 @@ impl Stage {
         make: impl FnOnce(&Arc<ManualClock>) -> (Box<dyn Ground>, bool),
     ) -> Self {
         let clock = Arc::new(ManualClock::new(Time(BEGIN)));
-        let (ground, has_short_memory) = make(&clock);
+        let (ground, is_in_memory) = make(&clock);
         let share = |weight, most: Option<u32>| Share {
             weight: Weight::try_from(weight).unwrap(),
             most_running: most.map(|most| most.try_into().unwrap()),
@@ -130,7 +130,7 @@ impl Stage {
             scale,
             flaw,
             shares,
-            has_short_memory,
+            is_in_memory,
         };
         (0..scale.hosts).for_each(|host| stage.after(0, Act::Rise(host)));
         [Act::Intake, Act::Operator, Act::Teller, Act::Trouble].into_iter().for_each(|act| stage.after(1000, act));

@@ -123,6 +123,7 @@ fn a_store_that_breaks_its_word_is_found_out() {
         (Flaw::Unfair, "turns"),
         (Flaw::Boundless, "no room"),
         (Flaw::Forgetful, "each file has one job"),
+        (Flaw::Silent, "nobody is told"),
     ] {
         let found_out = |seed| {
             let ran = catch_unwind(AssertUnwindSafe(|| run(seed, SMALL, flaw, in_memory(flaw))));

@@ -7,7 +7,7 @@ use rustix::process::Signal;
 use suture_tests::proxy::Mood;
 use suture_tests::served::wait_until;
 
-use crate::farm_members::{Farm, Member, is_over};
+use crate::farm_members::{Farm, Kind, Member, is_over};
 use crate::stage::row;
 use crate::world::{fill_bytes, is_root};
 
@@ -116,10 +116,21 @@ impl Round<'_, '_> {
 /// Four workers, each on a machine of its own, as the intake, the database and the object store are.
 #[test]
 fn machines_fail_and_each_file_has_one_result() {
-    if !is_root("a farm whose machines fail") {
-        return;
+    if is_root("a farm whose machines fail") {
+        machines_fail(Kind::Bucket, "a farm whose machines fail");
     }
-    let Some(farm) = Farm::new(None) else { return };
+}
+
+/// The same with a share: what a machine that is cut off or stopped had in work, another one goes on with, in the same folders.
+#[test]
+fn machines_fail_beside_a_share_and_each_file_has_one_result() {
+    if is_root("a farm beside a share") {
+        machines_fail(Kind::Share, "a farm beside a share");
+    }
+}
+
+fn machines_fail(kind: Kind, name: &str) {
+    let Some(farm) = Farm::new(kind) else { return };
     let (files, rounds) = scale();
     let mut intake = farm.member("intake", "intake,control");
     let mut workers: Vec<Member> = (1..=4).map(|n| farm.member(&format!("worker-{n}"), "worker")).collect();
@@ -140,11 +151,7 @@ fn machines_fail_and_each_file_has_one_result() {
     assert!(again > 0, "no fault met a job");
     let seen =
         format!("{files} results, once each, in {took} s; {again} jobs were tried again, {fenced} steps of lost claims refused");
-    row(
-        "a farm whose machines fail",
-        "cut off, late by 2 s, killed, stopped; database killed, its disk full; intake cut off, killed",
-        &seen,
-    );
+    row(name, "cut off, late by 2 s, killed, stopped; database killed, its disk full; intake cut off, killed", &seen);
 }
 
 /// Errors before and after the deed, answers cut and slow, listings of before.
@@ -153,7 +160,7 @@ fn the_object_store_fails_and_each_file_has_one_result() {
     if !is_root("a farm whose object store fails") {
         return;
     }
-    let Some(farm) = Farm::new(Some(Mood::Failing)) else { return };
+    let Some(farm) = Farm::new(Kind::BucketBehind(Mood::Failing)) else { return };
     let (files, _) = scale();
     let mut members: Vec<Member> = (1..=4).map(|n| farm.member(&format!("worker-{n}"), "worker")).collect();
     members.push(farm.member("intake", "intake,control"));
@@ -164,7 +171,7 @@ fn the_object_store_fails_and_each_file_has_one_result() {
     farm.wait_for(files, &mut members);
     let took = begun.elapsed().as_secs();
     farm.assert_as_of_one_machine(files);
-    let met = farm.way.as_ref().expect("there is a way").met();
+    let met = farm.files.way().expect("there is a way").met();
     assert!(met.iter().all(|(_, count)| *count > 0), "{met:?}");
     row("a farm whose object store fails", &format!("{met:?}"), &format!("{files} results, once each, in {took} s"));
 }

@@ -12,7 +12,7 @@ use suture_tests::Place;
 use suture_tests::hot::holes;
 use suture_tests::moto::{Store, at};
 use suture_tests::proxy::{Mood, Proxy};
-use suture_tests::served::Served;
+use suture_tests::served::{Served, wait_until};
 use suture_tests::wire::{Host, Net};
 
 use crate::world::Mount;
@@ -24,11 +24,26 @@ pub(crate) struct Farm {
     /// The disk of the database.
     _disk: Mount,
     pub database: Host,
-    pub way: Option<Proxy>,
-    bucket: Store,
+    pub files: Files,
     net: Net,
-    _store: Host,
     url: String,
+}
+
+/// Where the files are that are dropped, and their results.
+pub(crate) enum Files {
+    /// An object store on a machine of its own, and the way to it, if that fails.
+    Bucket { bucket: Store, way: Option<Proxy>, _host: Host },
+    /// A folder that all machines have.
+    Share,
+}
+
+/// Where files are to be.
+#[derive(Clone, Copy)]
+pub(crate) enum Kind {
+    Bucket,
+    /// The way to it behaves so.
+    BucketBehind(Mood),
+    Share,
 }
 
 /// A machine with a daemon on it.
@@ -42,15 +57,14 @@ pub(crate) struct Member<'a> {
 }
 
 impl Farm {
-    /// `None`, and a line: this machine lacks something. With a mood the way to the object store behaves so. This thread is on the farm's network from
-    /// now on.
-    pub(crate) fn new(mood: Option<Mood>) -> Option<Self> {
+    /// `None`, and a line: this machine lacks something. This thread is on the farm's network from now on.
+    pub(crate) fn new(kind: Kind) -> Option<Self> {
         let net = Net::new()?;
         let place = Place::new();
         let disk = Mount::tmpfs(&place.at("disk"), "size=256m,mode=0755", 0);
         // The server has a user of its own.
         std::fs::set_permissions(place.at(""), Permissions::from_mode(0o755)).expect("the folder can be opened to others");
-        let (database, store) = (net.host(), net.host());
+        let database = net.host();
         let server = Server::start_in(&place.at("disk"), &["--wal-segsize=1"])?;
         let rules = server.folder().join("data/pg_hba.conf");
         let told = std::fs::read_to_string(&rules).expect("rules of access") + "host all owner 10.77.0.0/24 trust\n";
@@ -58,39 +72,46 @@ impl Farm {
         database.inside(|| {
             server.run_with(&format!("-c listen_addresses={} -c max_wal_size=16MB -c min_wal_size=2MB", database.address))
         });
-        let address = store.address.to_string();
-        let bucket = store.inside(|| Store::start_at(&address))?;
-        let way = mood.map(|mood| store.inside(|| Proxy::start(&address, bucket.address(), mood, 25)));
+        let files = Files::new(kind, &net)?;
         let url = format!("postgres://owner@{}/postgres", database.address);
         net.host().enter();
-        bucket.ask("PUT", "/prints", b"");
-        Some(Self { place, server, _disk: disk, database, way, bucket, net, _store: store, url })
+        if let Files::Bucket { bucket, .. } = &files {
+            bucket.ask("PUT", "/prints", b"");
+        }
+        Some(Self { place, server, _disk: disk, database, files, net, url })
     }
 
     /// A machine with a daemon of these roles, which begins.
     pub(crate) fn member(&self, name: &str, roles: &'static str) -> Member<'_> {
         let head = format!("state = \"{name}\"\nstore = \"{}\"\nrescan = \"5s\"\nworkers = 2\nthreads = 1\n", self.url);
-        self.place.put(
-            &format!("{name}.toml"),
-            format!("{head}[[folders]]\npath = \"s3://prints/farm\"\nname = \"farm\"\n").as_bytes(),
-        );
+        let of_folder = match &self.files {
+            Files::Bucket { .. } => "path = \"s3://prints/farm\"",
+            Files::Share => "path = \"share\"\nshared = true",
+        };
+        self.place.put(&format!("{name}.toml"), format!("{head}[[folders]]\n{of_folder}\nname = \"farm\"\n").as_bytes());
         let mut member = Member { farm: self, host: self.net.host(), name: name.into(), roles, daemon: None, lives: 0 };
         member.start();
         member
     }
 
     fn command(&self, name: &str, roles: &str) -> Command {
-        let address = self.way.as_ref().map_or(self.bucket.address(), |way| way.address);
-        let mut command = at(self.place.command(), &address);
+        let command = self.place.command();
+        let mut command = match &self.files {
+            Files::Bucket { bucket, way, .. } => at(command, &way.as_ref().map_or(bucket.address(), |way| way.address)),
+            Files::Share => command,
+        };
         command.args(["watch", "--config", &format!("{name}.toml"), "--role", roles]);
         command
     }
 
-    /// Drops files into the bucket, and into a folder of one machine.
+    /// Drops files into the farm's folder, and into a folder of one machine.
     pub(crate) fn drop_files(&self, numbers: std::ops::Range<u64>) {
         for n in numbers {
             let bytes = holes(n);
-            self.bucket.ask("PUT", &format!("/prints/farm/in/{n}.stl"), &bytes);
+            match &self.files {
+                Files::Bucket { bucket, .. } => drop(bucket.ask("PUT", &format!("/prints/farm/in/{n}.stl"), &bytes)),
+                Files::Share => self.place.put(&format!("share/in/{n}.stl"), &bytes),
+            }
             self.place.put(&format!("own/in/{n}.stl"), &bytes);
         }
     }
@@ -129,26 +150,80 @@ impl Farm {
         let is_doubled = |job: &&Value| jobs[&path(job)]["id"] != job["id"];
         assert!(all.len() as u64 == count, "{} jobs; there are two of these: {:#?}", all.len(), all.iter().find(is_doubled));
         let wanted: BTreeSet<String> = self.place.names("own").into_iter().collect();
-        // Notes of attempts that came to nothing stay for a day, as does what a daemon tried the bucket with.
-        let of_its_own = |key: &str| key.starts_with(".suture/probe-") || key.starts_with(".suture/attempts/");
-        let keys = self.bucket.keys().into_iter().filter_map(|key| key.strip_prefix("farm/").map(str::to_owned));
-        let there: BTreeSet<String> = keys.filter(|key| !of_its_own(key)).collect();
+        let there = self.names();
         let (more, less): (Vec<_>, Vec<_>) = (there.difference(&wanted).collect(), wanted.difference(&there).collect());
         assert!(more.is_empty() && less.is_empty(), "too many: {more:?}; missing: {less:?}");
         for name in wanted {
-            let (head, bytes) = self.bucket.answer("GET", &format!("/prints/farm/{name}"), b"");
+            let drop = name.split_once('/').map_or("", |(_, name)| name);
+            let drop = drop.split_once(".stl").map_or(drop, |(stem, _)| stem).trim_end_matches(".best");
+            let bytes = self.content(&name, jobs[&format!("{drop}.stl")]);
             if name.ends_with(".json") {
                 assert!(serde_json::from_slice::<Value>(&bytes).is_ok(), "{name} is not whole");
             } else {
                 assert!(bytes == self.place.read(&format!("own/{name}")), "{name} has other bytes");
             }
-            let drop = name.split_once('/').map_or("", |(_, name)| name);
-            let drop = drop.split_once(".stl").map_or(drop, |(stem, _)| stem).trim_end_matches(".best");
-            let job = jobs[&format!("{drop}.stl")];
-            let drop_key = job["source"]["ino"].as_u64().unwrap_or(0);
-            let owner = format!("{}-{}-{drop_key:x}", job["id"], job["work"]);
-            let told = head.lines().find_map(|line| line.strip_prefix("x-amz-meta-suture: ")).unwrap_or_default();
-            assert_eq!(told, owner, "{name} is of another claim: {head}");
+        }
+    }
+
+    /// The files of the farm's folder, but for those of its daemons.
+    fn names(&self) -> BTreeSet<String> {
+        match &self.files {
+            Files::Bucket { bucket, .. } => {
+                // Notes of attempts that came to nothing stay for a day, as does what a daemon tried the bucket with.
+                let of_its_own = |key: &str| key.starts_with(".suture/probe-") || key.starts_with(".suture/attempts/");
+                let keys = bucket.keys().into_iter().filter_map(|key| key.strip_prefix("farm/").map(str::to_owned));
+                keys.filter(|key| !of_its_own(key)).collect()
+            }
+            Files::Share => {
+                let work = || self.place.names("share/.suture/work");
+                wait_until("nothing is left of attempts", || work().is_empty());
+                self.place.names("share").into_iter().collect()
+            }
+        }
+    }
+
+    /// A file of the farm's folder, which the claim has put there that the store names.
+    fn content(&self, name: &str, job: &Value) -> Vec<u8> {
+        match &self.files {
+            Files::Bucket { bucket, .. } => {
+                let (head, bytes) = bucket.answer("GET", &format!("/prints/farm/{name}"), b"");
+                let drop_key = job["source"]["ino"].as_u64().unwrap_or(0);
+                let owner = format!("{}-{}-{drop_key:x}", job["id"], job["work"]);
+                let told = head.lines().find_map(|line| line.strip_prefix("x-amz-meta-suture: ")).unwrap_or_default();
+                assert_eq!(told, owner, "{name} is of another claim: {head}");
+                bytes
+            }
+            Files::Share => {
+                let bytes = self.place.read(&format!("share/{name}"));
+                if name.ends_with(".suture.json") {
+                    let receipt: Value = serde_json::from_slice(&bytes).expect("a receipt");
+                    assert_eq!([&receipt["job"], &receipt["work"]], [&job["id"], &job["work"]], "{name} is of another claim");
+                }
+                bytes
+            }
+        }
+    }
+}
+
+impl Files {
+    fn new(kind: Kind, net: &Net) -> Option<Self> {
+        let mood = match kind {
+            Kind::Share => return Some(Self::Share),
+            Kind::Bucket => None,
+            Kind::BucketBehind(mood) => Some(mood),
+        };
+        let host = net.host();
+        let address = host.address.to_string();
+        let bucket = host.inside(|| Store::start_at(&address))?;
+        let way = mood.map(|mood| host.inside(|| Proxy::start(&address, bucket.address(), mood, 25)));
+        Some(Self::Bucket { bucket, way, _host: host })
+    }
+
+    /// The way to the object store, if that fails.
+    pub(crate) fn way(&self) -> Option<&Proxy> {
+        match self {
+            Self::Bucket { way, .. } => way.as_ref(),
+            Self::Share => None,
         }
     }
 }

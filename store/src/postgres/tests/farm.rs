@@ -96,10 +96,13 @@ fn a_lease_that_ran_out_gives_the_job_to_another_and_fences_the_first() {
         assert_eq!(stopped.heartbeat(claim).unwrap(), Lease::Held);
     }
     clock.pass(lease - 1);
-    assert_eq!(other.claim(&Filter::default()).unwrap(), None);
+    assert_eq!((other.claim(&Filter::default()).unwrap(), other.has_parked().unwrap()), (None, false));
     assert_eq!(other.recover(&|_| Testimony::InHand).unwrap(), [], "they are another daemon's");
     clock.pass(1);
+    // Nothing waits, and yet who asks for a turn has one.
+    assert_eq!((other.waiting(&Filter::default()).unwrap(), other.has_parked().unwrap()), (None, true));
     let taken: Vec<_> = std::iter::from_fn(|| other.claim(&Filter::default()).unwrap()).collect();
+    assert!(!other.has_parked().unwrap());
     let of = |id| taken.iter().find(|claim| claim.id == id).unwrap();
     let (again, on_its_way) = (of(running.id), of(published.id));
     assert_eq!((taken.len(), again.job.duty(), again.job.attempts), (2, Duty::Run, Attempt(2)));

@@ -1,0 +1,126 @@
+//! Which folders this daemon keeps, and the beginning of that. A folder that others serve, too, has one keeper; when that is gone, another daemon takes
+//! its place, and takes up what it left. The others look whether the folder is in reach, and no more.
+
+use std::time::{Duration, Instant};
+
+use suture_store::job::{Area, Kind};
+use suture_store::{Control, Query, Role, StoreError};
+
+use super::{Keeper, Kept, LOOK_FOR, control};
+use crate::attempt::Context;
+use crate::fsx;
+use crate::past::each_job;
+use crate::watch::clear;
+
+/// Time between looks at all drops of a shared folder, should jobs have ended elsewhere of which nothing was heard.
+const AFRESH_EVERY: Duration = Duration::from_secs(3600);
+/// Time between looks for what dead workers left there.
+const CLEAR_EVERY: Duration = Duration::from_secs(30);
+
+impl Keeper {
+    /// Takes up what earlier lives, or another daemon, left in the folders that this one begins to keep.
+    ///
+    /// # Errors
+    /// When the store failed.
+    pub(super) fn take_up(&mut self, now: Instant) -> Result<(), StoreError> {
+        let context = &self.context;
+        let new: Vec<bool> = self.folders.iter_mut().map(|kept| kept.begins_to_keep(context, now)).collect();
+        // All jobs are read for it.
+        if new.contains(&true) {
+            let mut new: Vec<&mut Kept> =
+                self.folders.iter_mut().zip(new).filter_map(|(kept, new)| new.then_some(kept)).collect();
+            remember_live(context, &mut new)?;
+            each_job(&*context.store, &mut |job| new.iter_mut().for_each(|kept| kept.remember(job, now)))?;
+            forget_noticed(context, &new)?;
+        }
+        for kept in &mut self.folders {
+            kept.look_after(context, now)?;
+        }
+        Ok(())
+    }
+}
+
+impl Kept {
+    /// Does this daemon begin to keep the folder? It asks now and then, as long as another one does.
+    fn begins_to_keep(&mut self, context: &Context, now: Instant) -> bool {
+        let kept = self.is_kept;
+        if kept && self.folder.keeps() {
+            return false;
+        }
+        self.is_kept = !self.folder.is_shared;
+        if self.folder.is_shared
+            && context.has(Role::Intake)
+            && self.asked.is_none_or(|then| now.duration_since(then) >= LOOK_FOR)
+        {
+            self.asked = Some(now);
+            self.is_kept = self.folder.try_keep();
+        }
+        if self.is_kept && self.folder.is_shared {
+            tracing::info!(folder = %self.folder.root.display(), "This daemon keeps the shared folder: it looks for drops.");
+            (self.dirty, self.afresh, self.cleared) = (true, Some(now), None);
+        }
+        self.is_kept && !kept
+    }
+
+    /// Looks whether a folder that another daemon keeps is in reach.
+    pub(super) fn visit(&mut self, context: &Context, now: Instant, here: Result<(), String>) -> Result<(), StoreError> {
+        match here {
+            Ok(()) => {
+                self.looked_at(context, now, Vec::new());
+                self.is_back(context);
+                Ok(())
+            }
+            Err(why) => self.tell_away(context, now, why),
+        }
+    }
+
+    /// Words for whoever hands a file over to a daemon that does not look for drops.
+    pub(super) fn elsewhere(&self) -> String {
+        format!("another daemon looks for drops in this folder: put the file into {}", self.folder.inbox().display())
+    }
+
+    /// Looks now and then at all drops of a shared folder again, and clears away what dead workers left.
+    fn look_after(&mut self, context: &Context, now: Instant) -> Result<(), StoreError> {
+        if !self.is_kept || !self.folder.is_shared || self.folder.check().is_err() {
+            return Ok(());
+        }
+        let is_due = |then: Option<Instant>, every| then.is_none_or(|then| now.duration_since(then) >= every);
+        if is_due(self.afresh, AFRESH_EVERY) {
+            self.afresh = Some(now);
+            self.reconciler.look_afresh();
+            self.dirty = true;
+        }
+        if is_due(self.cleared, CLEAR_EVERY) {
+            self.cleared = Some(now);
+            clear(context, &self.folder)?;
+        }
+        Ok(())
+    }
+}
+
+/// Jobs of earlier lives whose files still wait in `in/`.
+fn remember_live(context: &Context, new: &mut [&mut Kept]) -> Result<(), StoreError> {
+    let kinds = Kind::ALL.into_iter().filter(|kind| kind.is_live()).collect();
+    for job in context.store.list(&Query { kinds, ..Query::default() })? {
+        if let Some(kept) = new.iter_mut().find(|kept| kept.folder.name == job.source.folder)
+            && job.original().0 == Area::In
+        {
+            kept.reconciler.known(&job.source, job.id, Some(job.priority));
+        }
+    }
+    Ok(())
+}
+
+/// Files that were noticed in an earlier life and are gone now.
+fn forget_noticed(context: &Context, new: &[&mut Kept]) -> Result<(), StoreError> {
+    for job in context.store.list(&Query { kinds: vec![Kind::Noticed], ..Query::default() })? {
+        if let Some(kept) = new.iter().find(|kept| kept.folder.name == job.source.folder)
+            && kept.folder.check().is_ok()
+            && fsx::is_folder(&kept.folder.inbox()).is_ok_and(|there| there)
+            && fsx::exists(&kept.folder.inbox().join(job.source.path.to_path())).is_ok_and(|there| !there)
+        {
+            control(context, job.id, Control::Forget)?;
+        }
+    }
+    Ok(())
+}

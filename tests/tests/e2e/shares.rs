@@ -1,0 +1,131 @@
+//! A hot folder on a share, which daemons of several machines serve: the machines are processes with a state folder each, the share is a folder of all.
+
+use std::process::Command;
+
+use rustix::process::Signal;
+use suture_store::testkit::server::server;
+use suture_tests::Place;
+use suture_tests::hot::holes;
+use suture_tests::http::Client;
+use suture_tests::served::{Served, jobs, wait_until};
+
+use super::farm::{database, is_over, shared_jobs};
+
+/// Configures a host, with these lines about the folder.
+fn configure(place: &Place, host: &str, url: &str, of_folder: &str) {
+    let head = format!("state = \"{host}\"\nstore = \"{url}\"\nsettle = \"30ms\"\nrescan = \"200ms\"\ncheck_one_in = 0\n");
+    let text = format!("{head}[[folders]]\npath = \"share\"\nname = \"prints\"\n{of_folder}\n[api]\nlisten = \"127.0.0.1:0\"\n");
+    place.put(&format!("{host}.toml"), text.as_bytes());
+}
+
+fn command(place: &Place, host: &str, words: &[&str]) -> Command {
+    let mut command = place.command();
+    command.args(["watch", "--config", &format!("{host}.toml")]).args(words);
+    command
+}
+
+fn start<'a>(place: &'a Place, host: &str, words: &[&str]) -> Served<'a> {
+    Served::of(place, command(place, host, words), &format!("{host}.log"))
+}
+
+fn drop_files(place: &Place, numbers: std::ops::RangeInclusive<u64>) {
+    for n in numbers {
+        // As a careful program does.
+        place.put(&format!("share/in/.{n}.tmp"), &holes(1 + n % 4));
+        std::fs::rename(place.at(&format!("share/in/.{n}.tmp")), place.at(&format!("share/in/{n}.stl"))).expect("a rename");
+    }
+}
+
+fn wait_for(place: &Place, url: &str, count: usize) {
+    wait_until("all are done", || {
+        let jobs = shared_jobs(place, url);
+        jobs.len() == count && jobs.iter().all(|job| is_over(&job.2))
+    });
+}
+
+/// Each of so many drops has one result, which is that of a machine alone, and its original is whole.
+fn assert_done(place: &Place, count: u64) {
+    wait_until("no attempt leaves anything", || place.names("share/.suture/work").is_empty());
+    let (mut out, mut done) = (Vec::new(), Vec::new());
+    for n in 1..=count {
+        done.push(format!("{n}.stl"));
+        out.extend(["", ".report.json", ".suture.json"].map(|end| format!("{n}.stl{end}")));
+        place.put(&format!("{n}.stl"), &holes(1 + n % 4));
+        place.repair(&format!("{n}.stl"), &format!("{n}.repaired.stl"), &[]);
+        assert!(place.read(&format!("share/out/{n}.stl")) == place.read(&format!("{n}.repaired.stl")), "the result of {n}");
+        assert!(place.read(&format!("share/done/{n}.stl")) == holes(1 + n % 4), "the original of {n}");
+    }
+    for (part, mut wanted) in [("out", out), ("done", done), ("in", Vec::new()), ("failed", Vec::new())] {
+        wanted.sort();
+        let mut names = place.names(&format!("share/{part}"));
+        names.sort();
+        assert_eq!(names, wanted, "{part}");
+    }
+}
+
+/// What it says when it does not begin.
+fn refused(place: &Place, host: &str, words: &[&str], exit: i32) -> String {
+    let mut arguments = vec!["watch".to_owned(), "--config".into(), format!("{host}.toml")];
+    arguments.extend(words.iter().map(|word| (*word).to_owned()));
+    place.suture(&arguments).expect(exit).stderr()
+}
+
+#[test]
+fn a_share_without_a_database_that_others_see_is_refused_in_a_line() {
+    let place = Place::new();
+    for (lines, says) in [
+        (
+            "[[folders]]\npath = \"share\"\nshared = true\n",
+            "line 2, `path = \"share\"`: a folder that daemons on several machines serve",
+        ),
+        ("state = \"s\"\n[[folders]]\npath = \"share\"\nshared = true\n", "the folder `share` is served by other daemons, too"),
+        ("state = \"share/s\"\n[[folders]]\npath = \"share\"\nshared = true\n", "`state` is of this machine alone"),
+        ("state = \"s\"\n[[folders]]\npath = \"s3://farm\"\nshared = true\n", "leave `shared` out"),
+    ] {
+        place.put("wrong.toml", lines.as_bytes());
+        let said = place.suture(["config", "check", "wrong.toml"]).expect(2).stderr();
+        assert!(said.contains(says) && said.lines().count() == 1, "{said}");
+    }
+}
+
+/// One daemon looks for drops, all work; when it ends, or is killed, another one looks. No daemon serves the folder alone meanwhile.
+#[test]
+fn daemons_of_several_machines_share_a_folder_whoever_keeps_it() {
+    let Some(server) = server() else { return };
+    let (place, url) = (Place::new(), database(server));
+    for host in ["one", "two", "works"] {
+        configure(&place, host, &url, "shared = true");
+    }
+    let keeps = |served: &Served| !served.lines("This daemon keeps the shared folder").is_empty();
+    let one = start(&place, "one", &[]);
+    wait_until("the first keeps it", || keeps(&one));
+    let (two, works) = (start(&place, "two", &[]), start(&place, "works", &["--role", "worker"]));
+    drop_files(&place, 1..=12);
+    wait_for(&place, &url, 12);
+    assert!(!keeps(&two) && !keeps(&works));
+    let by = [&one, &two, &works].map(|served| served.lines("\"state\":\"done\"").len());
+    assert_eq!(jobs(&place, "share").len(), 12, "the daemon that keeps it answers; done by {by:?}");
+    let client = Client::of(&two);
+    let said = client.send("POST", "/v1/jobs?name=x.stl", &[], &holes(1));
+    assert!(said.status == 400 && String::from_utf8_lossy(&said.body).contains("another daemon looks for drops"), "{said:?}");
+
+    configure(&place, "alone", &url, "");
+    let said = refused(&place, "alone", &[], 73);
+    assert!(said.contains("is served by another daemon") && said.lines().count() == 1, "{said}");
+    one.signal(Signal::TERM);
+    assert!(one.ended().success());
+    wait_until("the second keeps it", || keeps(&two));
+    drop_files(&place, 13..=16);
+    wait_for(&place, &url, 16);
+    // Not its end: a kill. Its lock goes with it, and what it holds of jobs is its own for a lease.
+    drop(two);
+    let one = start(&place, "one", &[]);
+    wait_until("the first keeps it again", || keeps(&one));
+    drop_files(&place, 17..=20);
+    wait_for(&place, &url, 20);
+    assert_done(&place, 20);
+    drop((one, works));
+    let said = place.suture(["jobs", "list", "--dir", "share"]).expect(2).stderr();
+    assert!(said.contains("the jobs are in postgres://") && said.contains("add --store"), "{said}");
+    assert!(place.suture(["watch", "share", "--once"]).expect(75).stderr().contains("its jobs are in postgres://"));
+}

@@ -187,6 +187,14 @@ impl LockFile {
         self.0.try_lock()
     }
 
+    /// Lets go of it.
+    ///
+    /// # Errors
+    /// As `flock`.
+    pub(crate) fn unlock(&self) -> io::Result<()> {
+        self.0.unlock()
+    }
+
     /// Locks it with others.
     ///
     /// # Errors

@@ -180,9 +180,9 @@ impl Ground {
     /// When another daemon serves it alone, it cannot be made, or this machine sees other numbers of files.
     pub(crate) fn visit(root: &Path) -> Result<Self, FolderError> {
         make_parts(root)?;
-        let shared = shared::join(root)?;
         let path = root.join(PRIVATE).join(LOCK);
         let lock = LockFile::open(&path).map_err(failed(&path, "cannot be opened"))?;
+        let shared = shared::join(root, &lock)?;
         // A number of a process says nothing on another machine.
         let pid = root.join(PRIVATE).join(PID);
         fsx::remove_if_there(&pid).map_err(failed(&pid, "cannot be removed"))?;

@@ -223,7 +223,7 @@ impl Keeper {
                     }
                 }
                 Ok(Event::Ended { folder, path, id }) => {
-                    if let Some(kept) = self.folders.iter_mut().find(|kept| kept.folder.name == folder) {
+                    if let Some(kept) = self.folders.iter_mut().find(|kept| kept.folder.name == folder && kept.is_kept) {
                         kept.reconciler.ended(&path);
                         kept.orders.ended(&path, id, self.context.world.steady());
                         kept.dirty = true;

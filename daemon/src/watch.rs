@@ -47,7 +47,7 @@ mod recover;
 mod threads;
 
 use notes::{note_folders, note_state};
-pub(crate) use recover::{clear, recover};
+pub(crate) use recover::recover;
 use threads::{Slots, guarded, no_thread, thread};
 
 /// How often what is gone is looked for.

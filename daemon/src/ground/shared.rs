@@ -19,14 +19,31 @@ fn path(root: &Path) -> PathBuf {
     root.join(PRIVATE).join(SHARED)
 }
 
-/// Joins the daemons that share the folder, as long as the file lives.
+/// Joins the daemons that share the folder, as long as the file lives. `owner` is the folder's lock: the first one of them has it meanwhile, so that no
+/// daemon serves the folder alone that knew of none.
 ///
 /// # Errors
 /// When a daemon serves it alone, or it cannot be locked.
-pub(super) fn join(root: &Path) -> Result<LockFile, FolderError> {
+pub(super) fn join(root: &Path, owner: &LockFile) -> Result<LockFile, FolderError> {
     let path = path(root);
+    let is_there = || fsx::exists(&path).map_err(FolderError::unseen(&path));
+    let is_first = !is_there()?;
+    if is_first {
+        match owner.try_lock() {
+            Ok(()) => {}
+            // One that came just before has it, or one that serves the folder alone.
+            Err(TryLockError::WouldBlock) if is_there()? => {}
+            Err(TryLockError::WouldBlock) => return Err(FolderError::Owned { root: root.to_owned(), pid: None }),
+            Err(TryLockError::Error(source)) => return Err(failed(&path, "cannot be locked")(source)),
+        }
+    }
     let file = LockFile::open(&path).map_err(failed(&path, "cannot be opened"))?;
-    match file.try_lock_shared() {
+    let locked = file.try_lock_shared();
+    if is_first {
+        // What cannot be given back is kept, until whoever asks ends.
+        let _ = owner.unlock();
+    }
+    match locked {
         Ok(()) => Ok(file),
         Err(TryLockError::WouldBlock) => Err(FolderError::Owned { root: root.to_owned(), pid: None }),
         Err(TryLockError::Error(source)) => Err(failed(&path, "cannot be locked")(source)),
@@ -87,6 +104,19 @@ mod tests {
         assert!(matches!(Ground::visit(root), Err(FolderError::Owned { .. })));
         drop(alone);
         Ground::visit(root).unwrap();
+    }
+
+    /// One that serves it alone may have begun when nobody shared it.
+    #[test]
+    fn a_folder_that_one_serves_alone_is_not_shared() {
+        let dir = tempfile::tempdir().unwrap();
+        let alone = Ground::take(dir.path()).unwrap();
+        for _ in 0..2 {
+            assert!(matches!(Ground::visit(dir.path()), Err(FolderError::Owned { .. })));
+        }
+        drop(alone);
+        let mut one = Ground::visit(dir.path()).unwrap();
+        assert!(one.try_keep().unwrap(), "nobody has it by then");
     }
 
     /// As by a file system that numbers files on each machine anew.

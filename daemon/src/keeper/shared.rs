@@ -7,10 +7,10 @@ use suture_store::job::{Area, Kind};
 use suture_store::{Control, Query, Role, StoreError};
 
 use super::{Keeper, Kept, LOOK_FOR, control};
-use crate::attempt::Context;
+use crate::attempt::{Context, clear};
 use crate::fsx;
 use crate::past::each_job;
-use crate::watch::clear;
+use crate::uploads;
 
 /// Time between looks at all drops of a shared folder, should jobs have ended elsewhere of which nothing was heard.
 const AFRESH_EVERY: Duration = Duration::from_secs(3600);
@@ -58,6 +58,8 @@ impl Kept {
         if self.is_kept && self.folder.is_shared {
             tracing::info!(folder = %self.folder.root.display(), "This daemon keeps the shared folder: it looks for drops.");
             (self.dirty, self.afresh, self.cleared) = (true, Some(now), None);
+            // The one that kept it before is gone, and with it whoever sent it files.
+            uploads::clear(&self.folder);
         }
         self.is_kept && !kept
     }

@@ -1,14 +1,12 @@
 //! What an earlier life left: its jobs are taken up, and its work folders cleared away. Jobs are held by workers alone.
 
-use std::collections::BTreeSet;
 use std::sync::Arc;
 
-use suture_store::job::{Kind, Testimony};
-use suture_store::{Job, Query, StoreError, crash_point};
+use suture_store::job::Testimony;
+use suture_store::{Job, StoreError, crash_point};
 
-use crate::attempt::{Context, IN_HAND, Slot, WITNESS, remove_work};
+use crate::attempt::{Context, IN_HAND, Slot, WITNESS, clear};
 use crate::event::{Happening, Recovery};
-use crate::folder::Folder;
 use crate::publish_error::PublishError;
 use crate::schedule::Turn;
 use crate::{fsx, uploads};
@@ -54,28 +52,4 @@ pub(crate) fn recover(context: &Arc<Context>) -> Result<(), StoreError> {
         .iter()
         .filter(|folder| !folder.is_shared && folder.check().is_ok())
         .try_for_each(|folder| clear(context, folder))
-}
-
-/// Clears away what no job has in work, in a folder that this daemon keeps.
-///
-/// # Errors
-/// When the store failed.
-pub(crate) fn clear(context: &Context, folder: &Folder) -> Result<(), StoreError> {
-    uploads::clear(folder);
-    if context.unread.has(folder) {
-        return Ok(());
-    }
-    // In this order: a work folder is made after its claim, by whatever machine, so that each of a job under claim is among those listed then.
-    let found: Vec<_> = std::fs::read_dir(folder.work_root()).into_iter().flatten().flatten().collect();
-    if found.is_empty() {
-        return Ok(());
-    }
-    let kinds = Kind::ALL.into_iter().filter(|kind| kind.is_held() || *kind == Kind::Parked).collect();
-    let jobs = context.store.list(&Query { kinds, ..Query::default() })?;
-    let tokens = |job: &Job| [job.work, job.hold().map(|hold| hold.token)];
-    let held: BTreeSet<String> = jobs.iter().flat_map(tokens).flatten().map(|token| token.to_string()).collect();
-    for entry in found.iter().filter(|entry| !entry.file_name().to_str().is_some_and(|name| held.contains(name))) {
-        remove_work(&entry.path());
-    }
-    Ok(())
 }

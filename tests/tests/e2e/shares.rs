@@ -88,7 +88,7 @@ fn a_share_without_a_database_that_others_see_is_refused_in_a_line() {
     }
 }
 
-/// One daemon looks for drops, all work; when it ends, or is killed, another one looks. No daemon serves the folder alone meanwhile.
+/// One daemon looks for drops, and another one works; when the first ends, or is killed, a third one looks. No daemon serves the folder alone meanwhile.
 #[test]
 fn daemons_of_several_machines_share_a_folder_whoever_keeps_it() {
     let Some(server) = server() else { return };
@@ -97,14 +97,14 @@ fn daemons_of_several_machines_share_a_folder_whoever_keeps_it() {
         configure(&place, host, &url, "shared = true");
     }
     let keeps = |served: &Served| !served.lines("This daemon keeps the shared folder").is_empty();
-    let one = start(&place, "one", &[]);
+    let looks = ["--role", "intake,control"];
+    let one = start(&place, "one", &looks);
     wait_until("the first keeps it", || keeps(&one));
-    let (two, works) = (start(&place, "two", &[]), start(&place, "works", &["--role", "worker"]));
+    let (two, works) = (start(&place, "two", &looks), start(&place, "works", &["--role", "worker"]));
     drop_files(&place, 1..=12);
     wait_for(&place, &url, 12);
     assert!(!keeps(&two) && !keeps(&works));
-    let by = [&one, &two, &works].map(|served| served.lines("\"state\":\"done\"").len());
-    assert_eq!(jobs(&place, "share").len(), 12, "the daemon that keeps it answers; done by {by:?}");
+    assert_eq!(jobs(&place, "share").len(), 12, "the daemon that keeps it answers");
     let client = Client::of(&two);
     let said = client.send("POST", "/v1/jobs?name=x.stl", &[], &holes(1));
     assert!(said.status == 400 && String::from_utf8_lossy(&said.body).contains("another daemon looks for drops"), "{said:?}");
@@ -117,9 +117,9 @@ fn daemons_of_several_machines_share_a_folder_whoever_keeps_it() {
     wait_until("the second keeps it", || keeps(&two));
     drop_files(&place, 13..=16);
     wait_for(&place, &url, 16);
-    // Not its end: a kill. Its lock goes with it, and what it holds of jobs is its own for a lease.
+    // Not its end: a kill. Its lock goes with it.
     drop(two);
-    let one = start(&place, "one", &[]);
+    let one = start(&place, "one", &looks);
     wait_until("the first keeps it again", || keeps(&one));
     drop_files(&place, 17..=20);
     wait_for(&place, &url, 20);
@@ -128,4 +128,27 @@ fn daemons_of_several_machines_share_a_folder_whoever_keeps_it() {
     let said = place.suture(["jobs", "list", "--dir", "share"]).expect(2).stderr();
     assert!(said.contains("the jobs are in postgres://") && said.contains("add --store"), "{said}");
     assert!(place.suture(["watch", "share", "--once"]).expect(75).stderr().contains("its jobs are in postgres://"));
+}
+
+/// Its files are worked on elsewhere: an order has one summary, of all of them, by the daemon that keeps the folder.
+#[test]
+fn an_order_on_a_share_is_summed_up_by_one() {
+    let Some(server) = server() else { return };
+    let (place, url) = (Place::new(), database(server));
+    for host in ["one", "two"] {
+        configure(&place, host, &url, "shared = true");
+    }
+    let (one, two) = (start(&place, "one", &["--role", "intake,control"]), start(&place, "two", &["--role", "worker"]));
+    for n in 1..=16 {
+        place.put(&format!("share/in/order/{n}.stl"), &holes(1 + n % 4));
+    }
+    wait_for(&place, &url, 16);
+    let summary = "share/out/order/order.report.json";
+    let of_all = || {
+        let told: serde_json::Value = serde_json::from_slice(&place.read(summary)).expect("a summary");
+        told["files"].as_array().is_some_and(|files| files.len() == 16)
+    };
+    wait_until("it is summed up", || place.at(summary).exists() && of_all());
+    let told_by = [&one, &two].map(|served| served.lines("An order is done").len());
+    assert!(told_by[0] >= 1 && told_by[1] == 0, "{told_by:?}");
 }

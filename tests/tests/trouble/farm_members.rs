@@ -110,7 +110,7 @@ impl Farm {
             let bytes = holes(n);
             match &self.files {
                 Files::Bucket { bucket, .. } => drop(bucket.ask("PUT", &format!("/prints/farm/in/{n}.stl"), &bytes)),
-                Files::Share => self.place.put(&format!("share/in/{n}.stl"), &bytes),
+                Files::Share => drop(self.place.put(&format!("share/in/{n}.stl"), &bytes)),
             }
             self.place.put(&format!("own/in/{n}.stl"), &bytes);
         }

@@ -39,13 +39,12 @@ use crate::supervise::{Cause, Ended};
 use crate::world::World;
 
 mod carry;
-mod clear;
+pub(crate) mod clear;
 mod conclude;
 mod request;
 mod staff;
 mod worked;
 
-pub(crate) use clear::clear;
 pub(crate) use request::{IN_HAND, WITNESS};
 use request::{limits, request};
 use staff::Staff;

@@ -18,7 +18,7 @@ use suture_store::{Job, Source, Token};
 use crate::bucket::Trouble;
 use crate::create;
 use crate::folder::{Folder, make_parent};
-use crate::fsx::{self, Identity};
+use crate::fsx::{self, Identity, NO_DEVICE};
 use crate::shelf::Shelf;
 use crate::units::show_size;
 
@@ -118,9 +118,6 @@ fn failed<'a>(what: &'a str) -> impl FnOnce(io::Error) -> Unclaimed + 'a {
         }
     }
 }
-
-/// The device of a file on a share, as a job notes it: none.
-pub(crate) const NO_DEVICE: u64 = 0;
 
 /// Is this the very file, whatever became of its content?
 pub(crate) fn is_inode(found: &Identity, source: &Source) -> bool {

@@ -10,7 +10,6 @@ use suture_store::job::Area;
 use suture_store::{RelPath, Token};
 
 use crate::alike::Alike;
-use crate::claim::NO_DEVICE;
 use crate::config::FolderConfig;
 use crate::config::taken::OnTaken;
 pub(crate) use crate::ground::{FolderError, is_fading, make_parent};
@@ -219,7 +218,7 @@ impl Folder {
 
     /// The device of a file, as a job notes it: each machine has a number of its own for a share.
     pub(crate) fn noted_device(&self, device: u64) -> u64 {
-        if self.is_shared { NO_DEVICE } else { device }
+        if self.is_shared { fsx::NO_DEVICE } else { device }
     }
 
     /// Has this machine ask the server of a share what lies in that folder, where it may remember an older state of it: opening a folder does that (NFS,

@@ -15,6 +15,9 @@ use suture_store::Hash;
 /// Longest file name in bytes on the file systems we meet.
 pub(crate) const NAME_MAX: usize = 255;
 
+/// The device of a file on a share, as a job notes it: none, since each machine has a number of its own for it.
+pub(crate) const NO_DEVICE: u64 = 0;
+
 /// What tells whether a file is still the one that was looked at. Renaming and linking change `ctime`, so it is compared only
 /// between two looks with neither in between.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]

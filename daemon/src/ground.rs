@@ -14,61 +14,16 @@ use std::time::{Duration, Instant};
 
 use rustix::fs::{AtFlags, CWD, StatxAttributes, StatxFlags};
 use serde::{Deserialize, Serialize};
-use suture_core::ErrorClass;
 
 use crate::create::{self, LockFile};
+pub(crate) use crate::folder_error::FolderError;
+use crate::folder_error::failed;
 use crate::fsx::{self, Identity};
+pub(crate) use crate::parts::{LOCK, PARTS, PRIVATE};
+use crate::parts::{MARK, PID};
 use crate::rights;
 
 mod shared;
-
-/// All parts of a hot folder.
-pub(crate) const PARTS: [&str; 6] = ["in", "out", "done", "failed", "quarantine", ".suture/work"];
-/// Work in progress and the job store.
-pub(crate) const PRIVATE: &str = ".suture";
-/// Locked by the daemon that serves the folder, and its process number.
-pub(crate) const LOCK: &str = "owner";
-const PID: &str = "owner.pid";
-/// Tells the folder from every other one.
-const MARK: &str = "id";
-
-/// Why a folder cannot be served.
-#[derive(Debug, thiserror::Error)]
-pub(crate) enum FolderError {
-    #[error("{} is served by another daemon{}", root.display(), pid.map(|pid| format!(" (process {pid})")).unwrap_or_default())]
-    Owned { root: PathBuf, pid: Option<u32> },
-    #[error("{} lies in the hot folder {}, which would take its files; put it beside that one, or remove {}/.suture if that is none any more", root.display(), outer.display(), outer.display())]
-    Within { root: PathBuf, outer: PathBuf },
-    #[error("{} and {} are one folder, or one lies in the other: results would be taken for drops", a.display(), b.display())]
-    Mixed { a: PathBuf, b: PathBuf },
-    #[error("{} is shared by daemons that run; stop them, or add `shared = true` to the folder in the configuration of this one, too", root.display())]
-    Shared { root: PathBuf },
-    #[error("{}: this machine sees other numbers of files than the one that served it first, and jobs tell files by them; mount it so that the server's numbers are seen (SMB: `serverino`), or, if it was moved or restored since, remove {}", root.display(), noted.display())]
-    Numbers { root: PathBuf, noted: PathBuf },
-    #[error("{}: does not answer: its server is gone or its disk hangs; see to its mount (`umount -f` gives it up)", root.display())]
-    Silent { root: PathBuf },
-    #[error("{0}")]
-    Bucket(String),
-    #[error("{}: {action}: {source}", path.display())]
-    Io { path: PathBuf, action: &'static str, source: io::Error },
-}
-
-impl FolderError {
-    /// Can the folder be served later, without anyone's change of the settings: when another daemon ends, or there is room again?
-    pub(crate) fn passes(&self) -> bool {
-        match self {
-            Self::Owned { .. } | Self::Shared { .. } => true,
-            Self::Io { source, .. } => ErrorClass::of(source) == ErrorClass::Shortage,
-            Self::Within { .. } | Self::Mixed { .. } | Self::Silent { .. } | Self::Bucket(_) | Self::Numbers { .. } => false,
-        }
-    }
-
-    /// Of a path that cannot be looked at.
-    pub(crate) fn unseen(path: &Path) -> impl FnOnce(io::Error) -> Self {
-        let path = path.to_owned();
-        move |source| Self::Io { path, action: "cannot be looked at", source }
-    }
-}
 
 /// What tells a hot folder again.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -363,11 +318,6 @@ pub(crate) fn is_fading(pid: Option<u32>, asked: Instant) -> bool {
     let pid = pid.and_then(|pid| i32::try_from(pid).ok()).and_then(rustix::process::Pid::from_raw);
     let dead = pid.is_some_and(|pid| rustix::process::test_kill_process(pid) == Err(rustix::io::Errno::SRCH));
     dead && asked.elapsed() < Duration::from_secs(2)
-}
-
-fn failed(path: &Path, action: &'static str) -> impl FnOnce(io::Error) -> FolderError {
-    let path = path.to_owned();
-    move |source| FolderError::Io { path, action, source }
 }
 
 /// Makes the parts of a hot folder that are missing.

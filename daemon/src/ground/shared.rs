@@ -8,9 +8,10 @@ use std::fs::TryLockError;
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 
-use super::{FolderError, MARK, PRIVATE, failed};
 use crate::create::{self, LockFile};
+use crate::folder_error::{FolderError, failed};
 use crate::fsx;
+use crate::parts::{MARK, PRIVATE};
 
 const SHARED: &str = "shared";
 const INODE: &str = "shared.inode";

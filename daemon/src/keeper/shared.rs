@@ -7,7 +7,8 @@ use suture_store::job::{Area, Kind};
 use suture_store::{Control, Query, Role, StoreError};
 
 use super::{Keeper, Kept, LOOK_FOR, control};
-use crate::attempt::{Context, clear};
+use crate::attempt::Context;
+use crate::attempt::clear::clear;
 use crate::fsx;
 use crate::past::each_job;
 use crate::uploads;

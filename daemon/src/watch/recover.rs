@@ -5,7 +5,8 @@ use std::sync::Arc;
 use suture_store::job::Testimony;
 use suture_store::{Job, StoreError, crash_point};
 
-use crate::attempt::{Context, IN_HAND, Slot, WITNESS, clear};
+use crate::attempt::clear::clear;
+use crate::attempt::{Context, IN_HAND, Slot, WITNESS};
 use crate::event::{Happening, Recovery};
 use crate::publish_error::PublishError;
 use crate::schedule::Turn;
@@ -47,9 +48,9 @@ pub(crate) fn recover(context: &Arc<Context>) -> Result<(), StoreError> {
         }
     }
     // What lies in a folder that others serve, too, is cleared away by whoever keeps it.
-    context
-        .folders
-        .iter()
-        .filter(|folder| !folder.is_shared && folder.check().is_ok())
-        .try_for_each(|folder| clear(context, folder))
+    for folder in context.folders.iter().filter(|folder| !folder.is_shared && folder.check().is_ok()) {
+        uploads::clear(folder);
+        clear(context, folder)?;
+    }
+    Ok(())
 }

@@ -106,9 +106,19 @@ pub(crate) fn noted(state: &Path) -> io::Result<Option<String>> {
 /// # Errors
 /// When that cannot be written.
 pub(crate) fn note_in_folder(root: &Path, address: Option<&Address>) -> io::Result<()> {
-    let state = default_state(root);
-    if noted(&state)? == address.map(ToString::to_string) {
+    let (state, own) = (default_state(root), address.map(ToString::to_string));
+    let noted = noted(&state)?;
+    if noted == own {
         return Ok(());
+    }
+    if let Some(noted) = noted {
+        let folder = root.display().to_string();
+        tracing::warn!(
+            folder,
+            noted,
+            own,
+            "The jobs of this shared folder were in another database, or it was called otherwise; see that all its daemons use one."
+        );
     }
     make_parent(&note_in(&state))?;
     note(&state, address)

@@ -98,8 +98,11 @@ fn daemons_of_several_machines_share_a_folder_whoever_keeps_it() {
     }
     let keeps = |served: &Served| !served.lines("This daemon keeps the shared folder").is_empty();
     let looks = ["--role", "intake,control"];
+    // As of an upload to a daemon that died.
+    place.put("share/.suture/upload/left.part", b"solid");
     let one = start(&place, "one", &looks);
     wait_until("the first keeps it", || keeps(&one));
+    assert!(!place.at("share/.suture/upload/left.part").exists());
     let (two, works) = (start(&place, "two", &looks), start(&place, "works", &["--role", "worker"]));
     drop_files(&place, 1..=12);
     wait_for(&place, &url, 12);

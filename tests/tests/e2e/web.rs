@@ -146,3 +146,14 @@ fn an_address_that_is_taken_keeps_it_from_starting() {
     let refused = place.suture(["watch", "hot", "--listen", &address]).expect(2);
     assert!(refused.stderr().contains("cannot listen at") && refused.stderr().lines().count() == 1, "{}", refused.stderr());
 }
+
+/// Half of a file, and a folder of an attempt, as a daemon leaves them that dies.
+#[test]
+fn what_a_dead_daemon_left_half_done_goes_at_the_next_start() {
+    let place = Place::new();
+    for left in ["upload/left.part", "work/7/in.stl"] {
+        place.put(&format!("hot/.suture/{left}"), b"solid");
+    }
+    place.suture(["watch", "hot", "--once"]).expect(0);
+    assert!(!place.at("hot/.suture/upload/left.part").exists() && !place.at("hot/.suture/work/7").exists());
+}

@@ -3,6 +3,7 @@
 use std::ffi::OsStr;
 use std::io;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use suture_core::read::ENDINGS;
@@ -38,6 +39,8 @@ pub(crate) struct Folder {
     /// Daemons on other machines serve it, too.
     pub is_shared: bool,
     ground: Mutex<Result<Ground, Trace>>,
+    /// Of a shared one: this daemon has its lock.
+    is_kept: AtomicBool,
     /// `None`: whoever looks waits as long as it takes.
     sentinel: Option<Sentinel>,
 }
@@ -106,6 +109,7 @@ impl Folder {
             bucket: None,
             is_shared: config.is_shared,
             ground: Mutex::new(ground),
+            is_kept: AtomicBool::new(false),
             sentinel: None,
         }
     }
@@ -182,6 +186,7 @@ impl Folder {
                     if trace.is_unmounted(&self.root) {
                         // With its lock goes what keeps the file system from being unmounted in truth.
                         *ground = Err(trace);
+                        self.is_kept.store(false, Ordering::Release);
                     }
                     return why;
                 }
@@ -192,13 +197,14 @@ impl Folder {
         if let Some(missing) = trace.missing(&self.root) {
             return Err(missing);
         }
+        self.is_kept.store(false, Ordering::Release);
         *ground = Ok(take(&self.root, self.is_shared).map_err(|error| error.to_string())?);
         Ok(())
     }
 
-    /// Is it this daemon that looks for drops in it, and does what one has to do alone?
+    /// Is it this daemon that looks for drops in it, and does what one has to do alone? Looks at nothing.
     pub(crate) fn keeps(&self) -> bool {
-        !self.is_shared || self.ground().as_ref().is_ok_and(Ground::keeps)
+        !self.is_shared || self.is_kept.load(Ordering::Acquire)
     }
 
     /// Keeps it from now on, if no other daemon does. Returns whether this one does.
@@ -206,14 +212,17 @@ impl Folder {
         if !self.is_shared {
             return true;
         }
-        match self.ground().as_mut().map(Ground::try_keep) {
+        let mut ground = self.ground();
+        let keeps = match ground.as_mut().map(Ground::try_keep) {
             Ok(Ok(keeps)) => keeps,
             Ok(Err(error)) => {
                 tracing::debug!(folder = %self.root.display(), %error, "The lock of a shared folder cannot be asked for.");
                 false
             }
             Err(_) => false,
-        }
+        };
+        self.is_kept.store(keeps, Ordering::Release);
+        keeps
     }
 
     /// The device of a file, as a job notes it: each machine has a number of its own for a share.

@@ -161,11 +161,6 @@ impl Ground {
         Ok(Self { id, devices, trace, lock, keeps, _shared: shared })
     }
 
-    /// Does this daemon have the folder's lock?
-    pub(crate) fn keeps(&self) -> bool {
-        self.keeps
-    }
-
     /// Takes the lock of a folder that is shared, if nobody has it.
     ///
     /// # Errors

@@ -11,6 +11,7 @@ use crate::attempt::Context;
 use crate::attempt::clear::clear;
 use crate::fsx;
 use crate::past::each_job;
+use crate::sentinel::Answer;
 use crate::uploads;
 
 /// Time between looks at all drops of a shared folder, should jobs have ended elsewhere of which nothing was heard.
@@ -49,10 +50,9 @@ impl Kept {
             return false;
         }
         self.is_kept = !self.folder.is_shared;
-        if self.folder.is_shared
-            && context.has(Role::Intake)
-            && self.asked.is_none_or(|then| now.duration_since(then) >= LOOK_FOR)
-        {
+        let is_due = self.asked.is_none_or(|then| now.duration_since(then) >= LOOK_FOR);
+        // No other folder waits for a share that hangs.
+        if self.folder.is_shared && context.has(Role::Intake) && is_due && self.folder.answers() == Answer::Yes {
             self.asked = Some(now);
             self.is_kept = self.folder.try_keep();
         }
@@ -84,7 +84,7 @@ impl Kept {
 
     /// Looks now and then at all drops of a shared folder again, and clears away what dead workers left.
     fn look_after(&mut self, context: &Context, now: Instant) -> Result<(), StoreError> {
-        if !self.is_kept || !self.folder.is_shared || self.folder.check().is_err() {
+        if !self.is_kept || !self.folder.is_shared {
             return Ok(());
         }
         let is_due = |then: Option<Instant>, every| then.is_none_or(|then| now.duration_since(then) >= every);
@@ -93,7 +93,7 @@ impl Kept {
             self.reconciler.look_afresh();
             self.dirty = true;
         }
-        if is_due(self.cleared, CLEAR_EVERY) {
+        if is_due(self.cleared, CLEAR_EVERY) && self.folder.answers() == Answer::Yes && self.folder.check().is_ok() {
             self.cleared = Some(now);
             clear(context, &self.folder)?;
         }

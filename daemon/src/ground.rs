@@ -137,7 +137,16 @@ impl Ground {
         make_parts(root)?;
         let path = root.join(PRIVATE).join(LOCK);
         let lock = LockFile::open(&path).map_err(failed(&path, "cannot be opened"))?;
-        let shared = shared::join(root, &lock)?;
+        let is_first = shared::is_first(root, &lock)?;
+        if is_first {
+            mark(root, id(&std::fs::metadata(root).map_err(FolderError::unseen(root))?))
+                .map_err(failed(&root.join(PRIVATE).join(MARK), "cannot be written"))?;
+            shared::same_numbers(root)?;
+        }
+        let shared = shared::join(root)?;
+        if is_first {
+            lock.unlock().map_err(failed(&path, "cannot be unlocked"))?;
+        }
         // A number of a process says nothing on another machine.
         let pid = root.join(PRIVATE).join(PID);
         fsx::remove_if_there(&pid).map_err(failed(&pid, "cannot be removed"))?;

@@ -107,11 +107,11 @@ pub(crate) fn noted(state: &Path) -> io::Result<Option<String>> {
 /// When that cannot be written.
 pub(crate) fn note_in_folder(root: &Path, address: Option<&Address>) -> io::Result<()> {
     let (state, own) = (default_state(root), address.map(ToString::to_string));
-    let noted = noted(&state)?;
-    if noted == own {
+    let before = noted(&state)?;
+    if before == own {
         return Ok(());
     }
-    if let Some(noted) = noted {
+    if let Some(noted) = before {
         let folder = root.display().to_string();
         tracing::warn!(
             folder,
@@ -121,7 +121,9 @@ pub(crate) fn note_in_folder(root: &Path, address: Option<&Address>) -> io::Resu
         );
     }
     make_parent(&note_in(&state))?;
-    note(&state, address)
+    let written = note(&state, address);
+    // Another daemon may have noted it in the same moment.
+    if noted(&state)? == own { Ok(()) } else { written }
 }
 
 /// Notes that the jobs are there, or in the folder itself.

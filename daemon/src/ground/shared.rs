@@ -7,6 +7,7 @@
 use std::fs::TryLockError;
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
 
 use crate::create::{self, LockFile};
 use crate::folder_error::{FolderError, failed};
@@ -15,36 +16,45 @@ use crate::parts::{MARK, PRIVATE};
 
 const SHARED: &str = "shared";
 const INODE: &str = "shared.inode";
+/// The first daemon needs no longer to make a folder one that is shared.
+const MOMENT: Duration = Duration::from_secs(2);
 
 fn path(root: &Path) -> PathBuf {
     root.join(PRIVATE).join(SHARED)
 }
 
-/// Joins the daemons that share the folder, as long as the file lives. `owner` is the folder's lock: the first one of them has it meanwhile, so that no
-/// daemon serves the folder alone that knew of none.
+/// Is this the first daemon ever that shares the folder? Then `owner`, the folder's lock, is held, so that nobody else is, and no daemon that knows of no
+/// other serves it alone.
 ///
 /// # Errors
 /// When a daemon serves it alone, or it cannot be locked.
-pub(super) fn join(root: &Path, owner: &LockFile) -> Result<LockFile, FolderError> {
-    let path = path(root);
+pub(super) fn is_first(root: &Path, owner: &LockFile) -> Result<bool, FolderError> {
+    let (path, asked) = (path(root), Instant::now());
     let is_there = || fsx::exists(&path).map_err(FolderError::unseen(&path));
-    let is_first = !is_there()?;
-    if is_first {
+    while !is_there()? {
         match owner.try_lock() {
-            Ok(()) => {}
-            // One that came just before has it, or one that serves the folder alone.
-            Err(TryLockError::WouldBlock) if is_there()? => {}
+            Ok(()) if !is_there()? => return Ok(true),
+            Ok(()) => {
+                owner.unlock().map_err(failed(&path, "cannot be locked"))?;
+                return Ok(false);
+            }
+            // The first one has it, for a moment.
+            Err(TryLockError::WouldBlock) if asked.elapsed() < MOMENT => std::thread::sleep(Duration::from_millis(10)),
             Err(TryLockError::WouldBlock) => return Err(FolderError::Owned { root: root.to_owned(), pid: None }),
             Err(TryLockError::Error(source)) => return Err(failed(&path, "cannot be locked")(source)),
         }
     }
+    Ok(false)
+}
+
+/// Joins the daemons that share the folder, as long as the file lives. Whoever finds the file finds the folder's mark, too.
+///
+/// # Errors
+/// When a daemon serves it alone, or it cannot be locked.
+pub(super) fn join(root: &Path) -> Result<LockFile, FolderError> {
+    let path = path(root);
     let file = LockFile::open(&path).map_err(failed(&path, "cannot be opened"))?;
-    let locked = file.try_lock_shared();
-    if is_first {
-        // What cannot be given back is kept, until whoever asks ends.
-        let _ = owner.unlock();
-    }
-    match locked {
+    match file.try_lock_shared() {
         Ok(()) => Ok(file),
         Err(TryLockError::WouldBlock) => Err(FolderError::Owned { root: root.to_owned(), pid: None }),
         Err(TryLockError::Error(source)) => Err(failed(&path, "cannot be locked")(source)),
@@ -74,12 +84,19 @@ pub(super) fn alone(root: &Path) -> Result<Option<LockFile>, FolderError> {
 pub(super) fn same_numbers(root: &Path) -> Result<(), FolderError> {
     let (mark, noted) = (root.join(PRIVATE).join(MARK), root.join(PRIVATE).join(INODE));
     let seen = std::fs::metadata(&mark).map_err(FolderError::unseen(&mark))?.ino();
-    let others = fsx::text_if_there(&noted).map_err(FolderError::unseen(&noted))?;
-    match others.map(|text| text.trim().parse() == Ok(seen)) {
-        Some(true) => Ok(()),
-        Some(false) => Err(FolderError::Numbers { root: root.to_owned(), noted }),
-        None => create::replace(&noted, format!("{seen}\n").as_bytes()).map_err(failed(&noted, "cannot be written")),
-    }
+    let others = || fsx::text_if_there(&noted).map(|text| text.map(|text| text.trim().parse() == Ok(seen)));
+    let is_same = match others().map_err(FolderError::unseen(&noted))? {
+        Some(is_same) => is_same,
+        None => {
+            let written = create::replace(&noted, format!("{seen}\n").as_bytes());
+            // Another daemon may have noted it in the same moment.
+            match others().map_err(FolderError::unseen(&noted))? {
+                Some(is_same) => is_same,
+                None => return written.map_err(failed(&noted, "cannot be written")),
+            }
+        }
+    };
+    if is_same { Ok(()) } else { Err(FolderError::Numbers { root: root.to_owned(), noted }) }
 }
 
 #[cfg(test)]
@@ -118,6 +135,21 @@ mod tests {
         drop(alone);
         let mut one = Ground::visit(dir.path()).unwrap();
         assert!(one.try_keep().unwrap(), "nobody has it by then");
+    }
+
+    /// Daemons of a farm begin together, on a share that none of them knows: all of them see one mark.
+    #[test]
+    fn many_begin_together() {
+        for _ in 0..10 {
+            let dir = tempfile::tempdir().unwrap();
+            let grounds: Vec<Ground> = std::thread::scope(|scope| {
+                let all: Vec<_> = (0..8).map(|_| scope.spawn(|| Ground::visit(dir.path()).unwrap())).collect();
+                all.into_iter().map(|one| one.join().unwrap()).collect()
+            });
+            let first = grounds[0].trace().clone();
+            assert!(grounds.iter().all(|ground| *ground.trace() == first));
+            assert!(first.leads_here(dir.path()).unwrap());
+        }
     }
 
     /// As by a file system that numbers files on each machine anew.

@@ -422,7 +422,7 @@ impl Slot {
             Ended::Died(death) if !changed || !matches!(death.cause, Cause::Fault(_)) => Worked::died(&death, turn),
             _ if changed => Worked::Step(Step::Withdrawn(Withdrawal::Changed)),
             Ended::Done { report, written } => Worked::Report { report, written, reused: None },
-            Ended::Failed { class, message } => Worked::failed(class, &message, &request.shown_input, turn),
+            Ended::Failed { class, message } => Worked::failed(class, &message, &request.shown_input, turn, folder.is_shared),
             Ended::Died(death) => Worked::died(&death, turn),
         }
     }

@@ -66,7 +66,7 @@ impl Folder {
         let root = absolute(config)?;
         let ground = match known.filter(|known| known.missing(&root).is_some()) {
             Some(known) => Err(known.clone()),
-            None => Ok(take(&root, config.is_shared)?),
+            None => Ok(take(&root, config.is_shared.then_some(&config.name))?),
         };
         Ok(Self::at(root, config, ground))
     }
@@ -198,7 +198,7 @@ impl Folder {
             return Err(missing);
         }
         self.is_kept.store(false, Ordering::Release);
-        *ground = Ok(take(&self.root, self.is_shared).map_err(|error| error.to_string())?);
+        *ground = Ok(take(&self.root, self.is_shared.then_some(&self.name)).map_err(|error| error.to_string())?);
         Ok(())
     }
 
@@ -370,12 +370,12 @@ fn parts_apart(root: &Path) -> Result<(), FolderError> {
 }
 
 /// Makes a folder's parts and takes it, or visits it where others serve it, too, if it may be a hot one.
-fn take(root: &Path, is_shared: bool) -> Result<Ground, FolderError> {
+fn take(root: &Path, shared_as: Option<&String>) -> Result<Ground, FolderError> {
     if let Some(outer) = outer_folder(root)? {
         return Err(FolderError::Within { root: root.to_owned(), outer });
     }
     parts_apart(root)?;
-    if is_shared { Ground::visit(root) } else { Ground::take(root) }
+    shared_as.map_or_else(|| Ground::take(root), |name| Ground::visit(root, name))
 }
 
 /// What a name in `in/` is.

@@ -18,6 +18,8 @@ pub(crate) enum FolderError {
     Shared { root: PathBuf },
     #[error("{}: this machine sees other numbers of files than the one that served it first, and jobs tell files by them; mount it so that the server's numbers are seen (SMB: `serverino`), or, if it was moved or restored since, remove {}", root.display(), noted.display())]
     Numbers { root: PathBuf, noted: PathBuf },
+    #[error("{} is called `{other}` by the daemons that share it, and not `{name}`: add `name = \"{other}\"` to the folder in the configuration, or give all of them another one, and remove {}", root.display(), noted.display())]
+    Called { root: PathBuf, name: String, other: String, noted: PathBuf },
     #[error("{}: does not answer: its server is gone or its disk hangs; see to its mount (`umount -f` gives it up)", root.display())]
     Silent { root: PathBuf },
     #[error("{0}")]
@@ -32,7 +34,12 @@ impl FolderError {
         match self {
             Self::Owned { .. } | Self::Shared { .. } => true,
             Self::Io { source, .. } => ErrorClass::of(source) == ErrorClass::Shortage,
-            Self::Within { .. } | Self::Mixed { .. } | Self::Silent { .. } | Self::Bucket(_) | Self::Numbers { .. } => false,
+            Self::Within { .. }
+            | Self::Mixed { .. }
+            | Self::Silent { .. }
+            | Self::Bucket(_)
+            | Self::Numbers { .. }
+            | Self::Called { .. } => false,
         }
     }
 

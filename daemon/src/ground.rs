@@ -23,7 +23,7 @@ pub(crate) use crate::parts::{LOCK, PARTS, PRIVATE};
 use crate::parts::{MARK, PID};
 use crate::rights;
 
-mod shared;
+pub(crate) mod shared;
 
 /// What tells a hot folder again.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -132,8 +132,8 @@ impl Ground {
     /// Makes the parts that are missing, and serves the folder with others; see [`shared`]. Who keeps it is told by [`Ground::try_keep`].
     ///
     /// # Errors
-    /// When another daemon serves it alone, it cannot be made, or this machine sees other numbers of files.
-    pub(crate) fn visit(root: &Path) -> Result<Self, FolderError> {
+    /// When another daemon serves it alone, it cannot be made, this machine sees other numbers of files, or the others call it otherwise.
+    pub(crate) fn visit(root: &Path, name: &str) -> Result<Self, FolderError> {
         make_parts(root)?;
         let path = root.join(PRIVATE).join(LOCK);
         let lock = LockFile::open(&path).map_err(failed(&path, "cannot be opened"))?;
@@ -141,7 +141,7 @@ impl Ground {
         if is_first {
             mark(root, id(&std::fs::metadata(root).map_err(FolderError::unseen(root))?))
                 .map_err(failed(&root.join(PRIVATE).join(MARK), "cannot be written"))?;
-            shared::same_numbers(root)?;
+            shared::same_view(root, name)?;
         }
         let shared = shared::join(root)?;
         if is_first {
@@ -151,7 +151,7 @@ impl Ground {
         let pid = root.join(PRIVATE).join(PID);
         fsx::remove_if_there(&pid).map_err(failed(&pid, "cannot be removed"))?;
         let ground = Self::at(root, lock, false, Some(shared))?;
-        shared::same_numbers(root)?;
+        shared::same_view(root, name)?;
         Ok(ground)
     }
 

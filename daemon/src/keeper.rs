@@ -1,6 +1,7 @@
 //! The thread that looks after the hot folders: it scans them when something happened or it is time, tells the store of files that came to
 //! rest ([`crate::scan`]), and sees to it that there is room on the disk.
 
+use std::collections::BTreeSet;
 use std::io;
 use std::os::unix::fs::MetadataExt;
 use std::path::PathBuf;
@@ -79,10 +80,15 @@ struct Kept {
     unavailable: bool,
     /// This daemon keeps it: it looks for drops, and does what one has to do alone.
     is_kept: bool,
-    /// Of a shared one: when its lock was asked for last, all drops were looked at again, and it was cleared.
+    /// Of a shared one: when its lock was asked for last, it was asked which jobs have ended, and it was cleared.
     asked: Option<Instant>,
-    afresh: Option<Instant>,
+    heard: Option<Instant>,
+    hearing_takes: Duration,
     cleared: Option<Instant>,
+    /// Ended jobs that answer for files which stay in `in/`.
+    answering: BTreeSet<JobId>,
+    /// It was said that another daemon keeps it.
+    is_told: bool,
     told: Told,
     /// Files that were only noticed, and are gone.
     gone: Vec<JobId>,
@@ -111,8 +117,11 @@ impl Keeper {
                 unavailable: false,
                 is_kept: false,
                 asked: None,
-                afresh: None,
+                heard: None,
+                hearing_takes: Duration::ZERO,
                 cleared: None,
+                answering: BTreeSet::new(),
+                is_told: false,
                 told: Told::default(),
                 gone: Vec::new(),
                 renamed: Vec::new(),
@@ -176,7 +185,7 @@ impl Keeper {
         for handed in std::mem::take(&mut self.handed) {
             let Some(kept) = self.folders.iter_mut().find(|kept| kept.folder.name == handed.folder) else { continue };
             if !kept.is_kept {
-                handed.answer(Err(Untaken::Unavailable(kept.elsewhere())));
+                handed.answer(Err(Untaken::Unavailable("another daemon looks for drops in this folder".into())));
             } else if kept.folder.answers() != Answer::Yes {
                 let why = kept.folder.silence().unwrap_or_else(|| "the folder is slow to answer; try again".into());
                 handed.answer(Err(Untaken::Unavailable(why)));

@@ -19,6 +19,7 @@ use crate::exit::Exit;
 use crate::folder::must_answer;
 use crate::fsx;
 use crate::glance::{Glance, Work};
+use crate::ground::shared::is_for_many;
 use crate::schedule::Standing;
 use crate::shared::{daemon_name, noted, visit};
 use crate::{hosts, standstill, watch, watchdog};
@@ -125,6 +126,13 @@ pub(crate) fn watched() -> Result<(), Failure> {
 /// # Errors
 /// When `dir` is no hot folder, the daemon does not answer, or the wish cannot be noted.
 pub(crate) fn daemon(dir: &Path, wish: &DaemonWish) -> Result<Option<Standing>, Failure> {
+    if *wish != DaemonWish::Standing && is_for_many(dir).map_err(|error| unseen(dir, &error))? {
+        let line = format!(
+            "{}: daemons of several machines serve it, and a pause of one keeps no other from work; `suture hosts drain NAME --store …` has a machine rest",
+            dir.display()
+        );
+        return Err(Failure { line, exit: Exit::Refused });
+    }
     if let Some(standing) = through_daemon(dir, wish)? {
         return Ok(Some(standing));
     }

@@ -334,9 +334,13 @@ impl Reconciler {
         found.into_iter().filter(|(_, submission)| self.is_there(&submission.source).unwrap_or(false)).collect()
     }
 
-    /// Everything is to be looked at again: jobs may have ended elsewhere of which this daemon heard nothing.
-    pub(crate) fn look_afresh(&mut self) {
-        self.entries.retain(|_, entry| !matches!(entry, Entry::Submitted { foreign: false, .. }));
+    /// Files that lie in `in/` and have jobs.
+    pub(crate) fn with_jobs(&self) -> Vec<(PathBuf, JobId)> {
+        let job = |(path, entry): (&PathBuf, &Entry)| match entry {
+            Entry::Submitted { id, foreign: false, .. } => Some((path.clone(), *id)),
+            _ => None,
+        };
+        self.entries.iter().filter_map(job).collect()
     }
 
     /// A job answers for a file now.

@@ -85,9 +85,11 @@ pub(crate) fn serve(settings: Settings, once: bool, stop: &Stop, may_begin_anew:
             complain(&error);
             return match &error {
                 FolderError::Owned { .. } | FolderError::Shared { .. } => Exit::Owned,
-                FolderError::Within { .. } | FolderError::Mixed { .. } | FolderError::Bucket(_) | FolderError::Numbers { .. } => {
-                    Exit::Refused
-                }
+                FolderError::Within { .. }
+                | FolderError::Mixed { .. }
+                | FolderError::Bucket(_)
+                | FolderError::Numbers { .. }
+                | FolderError::Called { .. } => Exit::Refused,
                 FolderError::Silent { .. } => Exit::TryAgain,
                 FolderError::Io { source, .. } => Exit::of_start(source),
             };

@@ -2,9 +2,11 @@
 //! for drops, and does all that one has to do alone. The others *visit* it: they work on its jobs. When the keeper is gone, another one takes the lock.
 //!
 //! `.suture/shared` is locked by all of them together, and against them by a daemon that serves the folder alone. `.suture/shared.inode` is the number
-//! that the first of them saw of the folder's mark: jobs tell files by their numbers, so every machine must see the same.
+//! that the first of them saw of the folder's mark: jobs tell files by their numbers, so every machine must see the same. `.suture/shared.name` is its name,
+//! by which they tell jobs of the folder.
 
 use std::fs::TryLockError;
+use std::io;
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -16,6 +18,7 @@ use crate::parts::{MARK, PRIVATE};
 
 const SHARED: &str = "shared";
 const INODE: &str = "shared.inode";
+const NAME: &str = "shared.name";
 /// The first daemon needs no longer to make a folder one that is shared.
 const MOMENT: Duration = Duration::from_secs(2);
 
@@ -77,26 +80,48 @@ pub(super) fn alone(root: &Path) -> Result<Option<LockFile>, FolderError> {
     }
 }
 
-/// Does this machine see the same numbers of files as the others? The first one notes what it sees.
+/// Does this machine see the same numbers of files as the others, and does this daemon call the folder as they do? The first one notes both.
 ///
 /// # Errors
 /// When it does not.
-pub(super) fn same_numbers(root: &Path) -> Result<(), FolderError> {
+pub(super) fn same_view(root: &Path, name: &str) -> Result<(), FolderError> {
     let (mark, noted) = (root.join(PRIVATE).join(MARK), root.join(PRIVATE).join(INODE));
-    let seen = std::fs::metadata(&mark).map_err(FolderError::unseen(&mark))?.ino();
-    let others = || fsx::text_if_there(&noted).map(|text| text.map(|text| text.trim().parse() == Ok(seen)));
-    let is_same = match others().map_err(FolderError::unseen(&noted))? {
-        Some(is_same) => is_same,
-        None => {
-            let written = create::replace(&noted, format!("{seen}\n").as_bytes());
-            // Another daemon may have noted it in the same moment.
-            match others().map_err(FolderError::unseen(&noted))? {
-                Some(is_same) => is_same,
-                None => return written.map_err(failed(&noted, "cannot be written")),
-            }
+    let seen = std::fs::metadata(&mark).map_err(FolderError::unseen(&mark))?.ino().to_string();
+    if agreed(&noted, &seen)?.is_some() {
+        return Err(FolderError::Numbers { root: root.to_owned(), noted });
+    }
+    let noted = root.join(PRIVATE).join(NAME);
+    let other = agreed(&noted, name)?;
+    other.map_or(Ok(()), |other| Err(FolderError::Called { root: root.to_owned(), name: name.to_owned(), other, noted }))
+}
+
+/// What another daemon noted, if that is something else; where nothing is, this is noted.
+fn agreed(noted: &Path, own: &str) -> Result<Option<String>, FolderError> {
+    let read = || fsx::text_if_there(noted).map_err(FolderError::unseen(noted));
+    let mut there = read()?;
+    if there.is_none() {
+        let written = create::replace(noted, format!("{own}\n").as_bytes());
+        // Another daemon may have noted it in the same moment.
+        there = read()?;
+        if there.is_none() {
+            written.map_err(failed(noted, "cannot be written"))?;
         }
-    };
-    if is_same { Ok(()) } else { Err(FolderError::Numbers { root: root.to_owned(), noted }) }
+    }
+    Ok(there.map(|text| text.trim_end().to_owned()).filter(|text| text != own))
+}
+
+/// Is the folder one that daemons on several machines serve, or last served?
+///
+/// # Errors
+/// When that cannot be told.
+pub(crate) fn is_for_many(root: &Path) -> io::Result<bool> {
+    let Some(file) = LockFile::open_if_there(&path(root))? else { return Ok(false) };
+    match file.try_lock_shared() {
+        Ok(()) => Ok(true),
+        // One serves it alone by now.
+        Err(TryLockError::WouldBlock) => Ok(false),
+        Err(TryLockError::Error(error)) => Err(error),
+    }
 }
 
 #[cfg(test)]
@@ -109,7 +134,7 @@ mod tests {
     fn a_shared_folder_has_one_keeper_and_is_nobodys_alone() {
         let dir = tempfile::tempdir().unwrap();
         let root = dir.path();
-        let (mut one, mut two) = (Ground::visit(root).unwrap(), Ground::visit(root).unwrap());
+        let (mut one, mut two) = (Ground::visit(root, "hot").unwrap(), Ground::visit(root, "hot").unwrap());
         assert!(one.try_keep().unwrap() && one.try_keep().unwrap());
         assert!(!two.try_keep().unwrap());
         assert!(matches!(Ground::take(root), Err(FolderError::Owned { .. })));
@@ -119,9 +144,9 @@ mod tests {
         assert!(two.try_keep().unwrap());
         drop(two);
         let alone = Ground::take(root).unwrap();
-        assert!(matches!(Ground::visit(root), Err(FolderError::Owned { .. })));
+        assert!(matches!(Ground::visit(root, "hot"), Err(FolderError::Owned { .. })));
         drop(alone);
-        Ground::visit(root).unwrap();
+        Ground::visit(root, "hot").unwrap();
     }
 
     /// One that serves it alone may have begun when nobody shared it.
@@ -130,10 +155,10 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let alone = Ground::take(dir.path()).unwrap();
         for _ in 0..2 {
-            assert!(matches!(Ground::visit(dir.path()), Err(FolderError::Owned { .. })));
+            assert!(matches!(Ground::visit(dir.path(), "hot"), Err(FolderError::Owned { .. })));
         }
         drop(alone);
-        let mut one = Ground::visit(dir.path()).unwrap();
+        let mut one = Ground::visit(dir.path(), "hot").unwrap();
         assert!(one.try_keep().unwrap(), "nobody has it by then");
     }
 
@@ -143,7 +168,7 @@ mod tests {
         for _ in 0..10 {
             let dir = tempfile::tempdir().unwrap();
             let grounds: Vec<Ground> = std::thread::scope(|scope| {
-                let all: Vec<_> = (0..8).map(|_| scope.spawn(|| Ground::visit(dir.path()).unwrap())).collect();
+                let all: Vec<_> = (0..8).map(|_| scope.spawn(|| Ground::visit(dir.path(), "hot").unwrap())).collect();
                 all.into_iter().map(|one| one.join().unwrap()).collect()
             });
             let first = grounds[0].trace().clone();
@@ -156,10 +181,14 @@ mod tests {
     #[test]
     fn a_machine_that_sees_other_numbers_is_refused() {
         let dir = tempfile::tempdir().unwrap();
-        drop(Ground::visit(dir.path()).unwrap());
+        drop(Ground::visit(dir.path(), "hot").unwrap());
         std::fs::write(dir.path().join(".suture/shared.inode"), "7\n").unwrap();
-        let refused = Ground::visit(dir.path()).unwrap_err();
+        let refused = Ground::visit(dir.path(), "hot").unwrap_err();
         assert!(matches!(refused, FolderError::Numbers { .. }) && !refused.passes(), "{refused}");
         assert!(refused.to_string().contains("shared.inode"), "{refused}");
+        std::fs::remove_file(dir.path().join(".suture/shared.inode")).unwrap();
+        let refused = Ground::visit(dir.path(), "cold").unwrap_err().to_string();
+        assert!(refused.contains("is called `hot` by the daemons that share it, and not `cold`"), "{refused}");
+        Ground::visit(dir.path(), "hot").unwrap();
     }
 }

@@ -45,6 +45,10 @@ impl Keeper {
             );
             self.context.not_good.store(true, Ordering::Relaxed);
         }
+        for kept in self.folders.iter().filter(|kept| !kept.is_kept) {
+            tracing::warn!(folder = %kept.folder.root.display(), "Another daemon looks for drops in this folder; they are left to it.");
+            self.context.not_good.store(true, Ordering::Relaxed);
+        }
         self.tell_of_foreign()?;
         Ok(true)
     }

@@ -1,6 +1,7 @@
 //! Which folders this daemon keeps, and the beginning of that. A folder that others serve, too, has one keeper; when that is gone, another daemon takes
 //! its place, and takes up what it left. The others look whether the folder is in reach, and no more.
 
+use std::collections::BTreeSet;
 use std::time::{Duration, Instant};
 
 use suture_store::job::{Area, Kind};
@@ -14,8 +15,9 @@ use crate::past::each_job;
 use crate::sentinel::Answer;
 use crate::uploads;
 
-/// Time between looks at all drops of a shared folder, should jobs have ended elsewhere of which nothing was heard.
-const AFRESH_EVERY: Duration = Duration::from_secs(3600);
+/// Time between looks which jobs of a shared folder have ended elsewhere, of which nothing is heard; at least so many times as long as a look takes.
+const ASK_EVERY: Duration = Duration::from_secs(5);
+const ASK_TIMES: u32 = 50;
 /// Time between looks for what dead workers left there.
 const CLEAR_EVERY: Duration = Duration::from_secs(30);
 
@@ -56,9 +58,13 @@ impl Kept {
             self.asked = Some(now);
             self.is_kept = self.folder.try_keep();
         }
+        if !self.is_kept && !std::mem::replace(&mut self.is_told, true) {
+            tracing::info!(folder = %self.folder.root.display(), "Another daemon looks for drops in the shared folder; this one works on its jobs.");
+        }
         if self.is_kept && self.folder.is_shared {
             tracing::info!(folder = %self.folder.root.display(), "This daemon keeps the shared folder: it looks for drops.");
-            (self.dirty, self.afresh, self.cleared) = (true, Some(now), None);
+            (self.dirty, self.heard, self.cleared) = (true, None, None);
+            self.answering.clear();
             // The one that kept it before is gone, and with it whoever sent it files.
             uploads::clear(&self.folder);
         }
@@ -77,21 +83,44 @@ impl Kept {
         }
     }
 
-    /// Words for whoever hands a file over to a daemon that does not look for drops.
-    pub(super) fn elsewhere(&self) -> String {
-        format!("another daemon looks for drops in this folder: put the file into {}", self.folder.inbox().display())
+    /// A file that lies in `in/` while its job has ended elsewhere, and answers for it no longer, is a new drop. Orders with jobs that live are summed up
+    /// once more.
+    fn hear_of_ends(&mut self, context: &Context, now: Instant) -> Result<(), StoreError> {
+        let kinds = Kind::ALL.into_iter().filter(|kind| kind.is_live()).collect();
+        let mut live = BTreeSet::new();
+        for job in context.store.list(&Query { kinds, ..Query::default() })? {
+            if job.source.folder == self.folder.name {
+                self.orders.came(&job.source.path, job.id, now);
+                live.insert(job.id);
+            }
+        }
+        for (path, id) in self.reconciler.with_jobs() {
+            if live.contains(&id) || self.answering.contains(&id) {
+                continue;
+            }
+            match context.store.get(id)? {
+                Some(job) if job.kind().is_live() => {}
+                Some(job) if job.answers_for_source() => drop(self.answering.insert(id)),
+                _ => {
+                    self.reconciler.ended(&path);
+                    self.orders.ended(&path, id, now);
+                    self.dirty = true;
+                }
+            }
+        }
+        Ok(())
     }
 
-    /// Looks now and then at all drops of a shared folder again, and clears away what dead workers left.
+    /// Asks now and then which jobs have ended elsewhere, and clears away what dead workers left.
     fn look_after(&mut self, context: &Context, now: Instant) -> Result<(), StoreError> {
         if !self.is_kept || !self.folder.is_shared {
             return Ok(());
         }
         let is_due = |then: Option<Instant>, every| then.is_none_or(|then| now.duration_since(then) >= every);
-        if is_due(self.afresh, AFRESH_EVERY) {
-            self.afresh = Some(now);
-            self.reconciler.look_afresh();
-            self.dirty = true;
+        if is_due(self.heard, ASK_EVERY.max(self.hearing_takes * ASK_TIMES)) {
+            self.heard = Some(now);
+            self.hear_of_ends(context, now)?;
+            self.hearing_takes = context.world.steady().duration_since(now);
         }
         if is_due(self.cleared, CLEAR_EVERY) && self.folder.answers() == Answer::Yes && self.folder.check().is_ok() {
             self.cleared = Some(now);

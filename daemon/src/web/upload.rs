@@ -124,10 +124,9 @@ fn folder_of(context: &Context, name: Option<&str>) -> Result<Arc<Folder>, Probl
     let folder = found.cloned().ok_or_else(|| Problem::bad(format!("`folder` must be one of {}", names())))?;
     match &folder.bucket {
         None if folder.keeps() => Ok(folder),
-        None => {
-            let inbox = folder.inbox();
-            Err(Problem::bad(format!("another daemon looks for drops in the folder: put the file into {}", inbox.display())))
-        }
+        None => Err(Problem::unavailable(
+            "another daemon looks for drops in the folder: send the file there, or put it into its `in/`",
+        )),
         Some(shelf) => {
             Err(Problem::bad(format!("the folder lies in a bucket: put the file into {}/in/", shelf.bucket.address())))
         }

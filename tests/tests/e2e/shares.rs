@@ -3,6 +3,7 @@
 use std::process::Command;
 
 use rustix::process::Signal;
+use suture_bench::generate::{Case, write};
 use suture_store::testkit::server::server;
 use suture_tests::Place;
 use suture_tests::hot::holes;
@@ -110,11 +111,20 @@ fn daemons_of_several_machines_share_a_folder_whoever_keeps_it() {
     assert_eq!(jobs(&place, "share").len(), 12, "the daemon that keeps it answers");
     let client = Client::of(&two);
     let said = client.send("POST", "/v1/jobs?name=x.stl", &[], &holes(1));
-    assert!(said.status == 400 && String::from_utf8_lossy(&said.body).contains("another daemon looks for drops"), "{said:?}");
+    assert!(said.status == 503 && String::from_utf8_lossy(&said.body).contains("another daemon looks for drops"), "{said:?}");
 
     configure(&place, "alone", &url, "");
     let said = refused(&place, "alone", &[], 73);
     assert!(said.contains("is served by another daemon") && said.lines().count() == 1, "{said}");
+    for wish in ["pause", "drain"] {
+        let said = place.suture(["jobs", wish, "--dir", "share"]).expect(2).stderr();
+        assert!(said.contains("suture hosts drain NAME"), "{said}");
+    }
+    configure(&place, "called", &url, "shared = true");
+    let text = String::from_utf8(place.read("called.toml")).expect("text").replace("\"prints\"", "\"other\"");
+    place.put("called.toml", text.as_bytes());
+    let said = refused(&place, "called", &[], 2);
+    assert!(said.contains("is called `prints` by the daemons that share it"), "{said}");
     one.signal(Signal::TERM);
     assert!(one.ended().success());
     wait_until("the second keeps it", || keeps(&two));
@@ -154,4 +164,31 @@ fn an_order_on_a_share_is_summed_up_by_one() {
     wait_until("it is summed up", || place.at(summary).exists() && of_all());
     let told_by = [&one, &two].map(|served| served.lines("An order is done").len());
     assert!(told_by[0] >= 1 && told_by[1] == 0, "{told_by:?}");
+}
+
+/// A second name of a drop goes while it is worked on, as that of a dead attempt does: its inode changes, and its content does not. And a file that was
+/// moved away and back, by whose job's end on another host it is a new drop.
+#[test]
+fn a_drop_whose_second_name_goes_is_worked_on_all_the_same() {
+    let Some(server) = server() else { return };
+    let (place, url) = (Place::new(), database(server));
+    for host in ["one", "two"] {
+        configure(&place, host, &url, "shared = true");
+    }
+    let (_one, _two) = (start(&place, "one", &["--role", "intake,control"]), start(&place, "two", &["--role", "worker"]));
+    let mut large = Vec::new();
+    write(Case::Holes, 1_000_000, 7, &mut large).expect("a mesh");
+    place.put("share/.large.tmp", &large);
+    let second = |n: u64| place.at(&format!("share/.second.{n}"));
+    for n in 0..200 {
+        std::fs::hard_link(place.at("share/.large.tmp"), second(n)).expect("a second name");
+    }
+    std::fs::rename(place.at("share/.large.tmp"), place.at("share/in/large.stl")).expect("a rename");
+    wait_until("it is worked on", || shared_jobs(&place, &url).iter().any(|job| job.2 == "running"));
+    for n in 0..200 {
+        std::fs::remove_file(second(n)).expect("a second name goes");
+        std::thread::sleep(std::time::Duration::from_millis(10));
+    }
+    wait_for(&place, &url, 1);
+    assert!(place.at("share/out/large.stl").exists() && place.read("share/done/large.stl") == large);
 }

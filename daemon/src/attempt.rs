@@ -422,7 +422,9 @@ impl Slot {
             Ended::Died(death) if !changed || !matches!(death.cause, Cause::Fault(_)) => Worked::died(&death, turn),
             _ if changed => Worked::Step(Step::Withdrawn(Withdrawal::Changed)),
             Ended::Done { report, written } => Worked::Report { report, written, reused: None },
-            Ended::Failed { class, message } => Worked::failed(class, &message, &request.shown_input, turn, folder.is_shared),
+            // The engine saw the time of the inode alone, which another machine changes that gives its second name of the file up.
+            Ended::Failed { class: ErrorClass::Changed, .. } if folder.is_shared => Worked::Step(Step::HandBack),
+            Ended::Failed { class, message } => Worked::failed(class, &message, &request.shown_input, turn),
             Ended::Died(death) => Worked::died(&death, turn),
         }
     }
@@ -470,9 +472,7 @@ impl Slot {
 
 /// Another machine may have begun what this one goes on with.
 fn look_anew(folder: &Folder, job: &Job) {
-    let (area, path) = job.original();
-    let original = folder.area(area).join(path.to_path());
-    for there in [&folder.work_root(), &folder.work(job.work_token()), fsx::folder_of(&original)] {
+    for there in [&folder.work_root(), &folder.work(job.work_token()), fsx::folder_of(&folder.original(job))] {
         folder.look_anew(there);
     }
 }

@@ -139,8 +139,7 @@ pub(crate) fn claim(folder: &Folder, job: &Job, work: &Path, free: u64) -> Resul
     if let Some(shelf) = &folder.bucket {
         return fetch(folder, shelf, job, work, free);
     }
-    let (area, path) = job.original();
-    let original = folder.area(area).join(path.to_path());
+    let original = folder.original(job);
     folder.look_anew(fsx::folder_of(&original));
     let original = open(&original)?;
     let before = look(&original, job)?;
@@ -165,13 +164,12 @@ fn make_work(work: &Path) -> Result<(), Unclaimed> {
 
 /// Has the job's original, from its bucket, in `work`, which is made: the very version that the job is of.
 fn fetch(folder: &Folder, shelf: &Shelf, job: &Job, work: &Path, free: u64) -> Result<Claimed, Unclaimed> {
-    let (area, path) = job.original();
     let away = |trouble: Trouble| match trouble {
         Trouble::Changed => Unclaimed::Withdrawn(Withdrawal::Changed),
         Trouble::Local(error) => failed("the file cannot be fetched")(error),
         other => Unclaimed::Shortage(other.to_string()),
     };
-    let key = Shelf::key(&folder.root, &folder.area(area).join(path.to_path())).map_err(failed("the file has no key"))?;
+    let key = Shelf::key(&folder.root, &folder.original(job)).map_err(failed("the file has no key"))?;
     let Some(found) = shelf.bucket.stat(&key).map_err(away)? else {
         shelf.bucket.must_be_there().map_err(away)?;
         return Err(Unclaimed::Withdrawn(Withdrawal::Vanished));

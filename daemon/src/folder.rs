@@ -8,7 +8,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use suture_core::read::ENDINGS;
 use suture_store::job::Area;
-use suture_store::{RelPath, Token};
+use suture_store::{Job, RelPath, Token};
 
 use crate::alike::Alike;
 use crate::config::FolderConfig;
@@ -209,11 +209,11 @@ impl Folder {
 
     /// Keeps it from now on, if no other daemon does. Returns whether this one does.
     pub(crate) fn try_keep(&self) -> bool {
-        if !self.is_shared {
+        if self.keeps() {
             return true;
         }
-        let mut ground = self.ground();
-        let keeps = match ground.as_mut().map(Ground::try_keep) {
+        let ground = self.ground();
+        let keeps = match ground.as_ref().map(Ground::try_keep) {
             Ok(Ok(keeps)) => keeps,
             Ok(Err(error)) => {
                 tracing::debug!(folder = %self.root.display(), %error, "The lock of a shared folder cannot be asked for.");
@@ -234,7 +234,7 @@ impl Folder {
     /// close-to-open consistency).
     pub(crate) fn look_anew(&self, folder: &Path) {
         if self.is_shared {
-            // What cannot be opened is the business of whoever looks there.
+            // A folder that cannot be opened is the business of whoever looks there.
             drop(create::open_to_read(folder));
         }
     }
@@ -283,6 +283,12 @@ impl Folder {
             Area::Failed => "failed",
             Area::Quarantine => "quarantine",
         })
+    }
+
+    /// Where the original of a job is.
+    pub(crate) fn original(&self, job: &Job) -> PathBuf {
+        let (area, path) = job.original();
+        self.area(area).join(path.to_path())
     }
 
     /// Where the attempts' folders are.

@@ -45,12 +45,11 @@ impl FolderError {
 
     /// Of a path that cannot be looked at.
     pub(crate) fn unseen(path: &Path) -> impl FnOnce(io::Error) -> Self {
-        let path = path.to_owned();
-        move |source| Self::Io { path, action: "cannot be looked at", source }
+        failed(path, "cannot be looked at")
     }
 }
 
-/// What could not be done at a path.
+/// The error of a path at which something could not be done.
 pub(crate) fn failed(path: &Path, action: &'static str) -> impl FnOnce(io::Error) -> FolderError {
     let path = path.to_owned();
     move |source| FolderError::Io { path, action, source }

@@ -104,8 +104,6 @@ pub(crate) struct Ground {
     devices: [u64; PARTS.len()],
     trace: Trace,
     lock: LockFile,
-    /// The lock is held.
-    keeps: bool,
     /// Held with all that share the folder, or against them.
     _shared: Option<LockFile>,
 }
@@ -126,7 +124,7 @@ impl Ground {
         let pid = format!("{}\n", std::process::id());
         let path = root.join(PRIVATE).join(PID);
         create::replace(&path, pid.as_bytes()).map_err(failed(&path, "cannot be written"))?;
-        Self::at(root, lock, true, shared)
+        Self::at(root, lock, shared)
     }
 
     /// Makes the parts that are missing, and serves the folder with others; see [`shared`]. Who keeps it is told by [`Ground::try_keep`].
@@ -138,24 +136,19 @@ impl Ground {
         let path = root.join(PRIVATE).join(LOCK);
         let lock = LockFile::open(&path).map_err(failed(&path, "cannot be opened"))?;
         let is_first = shared::is_first(root, &lock)?;
+        let mut ground = Self::at(root, lock, None)?;
+        shared::same_view(root, name)?;
+        ground._shared = Some(shared::join(root)?);
         if is_first {
-            mark(root, id(&std::fs::metadata(root).map_err(FolderError::unseen(root))?))
-                .map_err(failed(&root.join(PRIVATE).join(MARK), "cannot be written"))?;
-            shared::same_view(root, name)?;
-        }
-        let shared = shared::join(root)?;
-        if is_first {
-            lock.unlock().map_err(failed(&path, "cannot be unlocked"))?;
+            ground.lock.unlock().map_err(failed(&path, "cannot be unlocked"))?;
         }
         // A number of a process says nothing on another machine.
         let pid = root.join(PRIVATE).join(PID);
         fsx::remove_if_there(&pid).map_err(failed(&pid, "cannot be removed"))?;
-        let ground = Self::at(root, lock, false, Some(shared))?;
-        shared::same_view(root, name)?;
         Ok(ground)
     }
 
-    fn at(root: &Path, lock: LockFile, keeps: bool, shared: Option<LockFile>) -> Result<Self, FolderError> {
+    fn at(root: &Path, lock: LockFile, shared: Option<LockFile>) -> Result<Self, FolderError> {
         let id = id(&std::fs::metadata(root).map_err(FolderError::unseen(root))?);
         let mut devices = [id.0; PARTS.len()];
         for (device, part) in devices.iter_mut().zip(PARTS) {
@@ -167,22 +160,19 @@ impl Ground {
         let mark = mark(root, id).map_err(failed(&path, "cannot be written"))?;
         let apart = PARTS.iter().zip(devices).filter(|(_, device)| *device != id.0).map(|(part, _)| (*part).to_owned());
         let trace = Trace { mark, mount, apart: apart.collect(), noted: None };
-        Ok(Self { id, devices, trace, lock, keeps, _shared: shared })
+        Ok(Self { id, devices, trace, lock, _shared: shared })
     }
 
     /// Takes the lock of a folder that is shared, if nobody has it.
     ///
     /// # Errors
     /// When it cannot be locked.
-    pub(crate) fn try_keep(&mut self) -> io::Result<bool> {
-        if !self.keeps {
-            match self.lock.try_lock() {
-                Ok(()) => self.keeps = true,
-                Err(TryLockError::WouldBlock) => {}
-                Err(TryLockError::Error(error)) => return Err(error),
-            }
+    pub(crate) fn try_keep(&self) -> io::Result<bool> {
+        match self.lock.try_lock() {
+            Ok(()) => Ok(true),
+            Err(TryLockError::WouldBlock) => Ok(false),
+            Err(TryLockError::Error(error)) => Err(error),
         }
-        Ok(self.keeps)
     }
 
     /// What tells it again.

@@ -55,6 +55,9 @@ pub(crate) struct Keeper {
     handed: Vec<Handed>,
     disk_looked: Option<Instant>,
     farm_looked: Option<Instant>,
+    /// When it was asked which jobs of shared folders have ended, and how long that took.
+    heard: Option<Instant>,
+    hearing_takes: Duration,
     nights: Nights,
     /// It was within the hours of work at the last look.
     is_open: bool,
@@ -80,10 +83,8 @@ struct Kept {
     unavailable: bool,
     /// This daemon keeps it: it looks for drops, and does what one has to do alone.
     is_kept: bool,
-    /// Of a shared one: when its lock was asked for last, it was asked which jobs have ended, and it was cleared.
+    /// Of a shared one: when its lock was asked for last, and when it was cleared.
     asked: Option<Instant>,
-    heard: Option<Instant>,
-    hearing_takes: Duration,
     cleared: Option<Instant>,
     /// Ended jobs that answer for files which stay in `in/`.
     answering: BTreeSet<JobId>,
@@ -117,8 +118,6 @@ impl Keeper {
                 unavailable: false,
                 is_kept: false,
                 asked: None,
-                heard: None,
-                hearing_takes: Duration::ZERO,
                 cleared: None,
                 answering: BTreeSet::new(),
                 is_told: false,
@@ -134,7 +133,19 @@ impl Keeper {
             folders.push(kept);
         }
         let (nights, context, stop) = (Nights::new(context), Arc::clone(context), stop.clone());
-        Self { context, inbox, stop, folders, handed: Vec::new(), disk_looked: None, farm_looked: None, nights, is_open: true }
+        Self {
+            context,
+            inbox,
+            stop,
+            folders,
+            handed: Vec::new(),
+            disk_looked: None,
+            farm_looked: None,
+            heard: None,
+            hearing_takes: Duration::ZERO,
+            nights,
+            is_open: true,
+        }
     }
 
     /// Keeps the folders until there is a reason to end.

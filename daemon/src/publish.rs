@@ -277,8 +277,7 @@ impl<'a> Desk<'a> {
     /// another file's by now, did not change.
     fn content_stands(&self, job: &Job, p: &Publication) -> Result<bool, PublishError> {
         let Some(ctime) = p.source_ctime_ns else { return Ok(true) };
-        let (area, path) = job.original();
-        let names = [self.folder.area(area).join(path.to_path()), self.work(job).join(CLAIMED)];
+        let names = [self.folder.original(job), self.work(job).join(CLAIMED)];
         let is_original = |found: &Identity| job.moved_to.is_some() || is_inode(found, &job.source);
         for path in &names {
             match fsx::look(path).map_err(io_at(path))?.filter(is_original) {
@@ -308,8 +307,7 @@ impl<'a> Desk<'a> {
 
     /// Gives a file that is about to be placed the rights of the original, and says so if whoever owned that is locked out.
     fn share(&self, job: &Job, file: &Path, to: &Path) -> Result<(), PublishError> {
-        let (area, path) = job.original();
-        let originals = [self.folder.area(area).join(path.to_path()), self.work(job).join(CLAIMED)];
+        let originals = [self.folder.original(job), self.work(job).join(CLAIMED)];
         // Gone, or out of sight: the result keeps the rights it has.
         let Some(original) = originals.iter().find_map(|path| std::fs::symlink_metadata(path).ok()) else { return Ok(()) };
         let rights = Rights::of(&original);
@@ -383,8 +381,7 @@ impl<'a> Desk<'a> {
         let Some(wanted) = publication.original.as_ref().filter(|_| !publication.stays) else {
             return Ok(self.store.advance(self.claim, Step::Finished)?);
         };
-        let (from_area, from_path) = job.original();
-        let from = self.folder.area(from_area).join(from_path.to_path());
+        let from = self.folder.original(job);
         let area = self.folder.area(publication.ending.area());
         let to = area.join(wanted.to_path());
         if from != to {

@@ -330,7 +330,7 @@ impl Reconciler {
 
     /// Of these submissions, the jobs of which had ended and may have moved the files: those whose files are there still, to be submitted once more.
     pub(crate) fn there_still(&self, found: Vec<(PathBuf, Submission)>) -> Vec<(PathBuf, Submission)> {
-        // What cannot be looked at settles further, and is submitted then.
+        // A file that cannot be looked at settles further, and is submitted then.
         found.into_iter().filter(|(_, submission)| self.is_there(&submission.source).unwrap_or(false)).collect()
     }
 

@@ -141,7 +141,7 @@ pub(crate) fn note(state: &Path, address: Option<&Address>) -> io::Result<()> {
 fn connect(address: &Address, config: &Config) -> Result<Arc<dyn JobStore>, StoreError> {
     use suture_store::{PostgresStore, Shared};
     let folders = Some(config.folders.iter().map(|folder| folder.name.clone()).collect());
-    // What lies in a bucket, or on a share, lies on no machine more than on another.
+    // A folder in a bucket or on a share lies on no machine more than on another.
     let joint = config.folders.iter().filter(|folder| folder.is_for_many()).map(|folder| folder.name.clone()).collect();
     let new = Shared::new(address.exposed(), &daemon_name(&config.state));
     Ok(Arc::new(PostgresStore::open(&Shared { folders, joint, station: station(config), ..new })?))

@@ -34,8 +34,7 @@ pub(super) enum Onward {
 
 impl Worked {
     /// The engine refused the file, or failed over it: what that means for the job.
-    /// `is_shared`: it lies on a share, and was looked at since.
-    pub(super) fn failed(class: ErrorClass, message: &str, shown_input: &str, turn: Turn, is_shared: bool) -> Self {
+    pub(super) fn failed(class: ErrorClass, message: &str, shown_input: &str, turn: Turn) -> Self {
         // Whoever reads it knows which file it is about.
         let reason = message.strip_prefix(&format!("{shown_input}: ")).unwrap_or(message).to_owned();
         match class {
@@ -44,8 +43,6 @@ impl Worked {
             ErrorClass::Refused | ErrorClass::Starved => Self::None(Ending::Refused, reason),
             ErrorClass::Environment => Self::Step(Step::Environment { reason }),
             ErrorClass::Shortage => Self::Step(Step::Wait { reason }),
-            // The engine saw the time of its inode alone, which another machine changes that gives its second name of the file up.
-            ErrorClass::Changed if is_shared => Self::Step(Step::HandBack),
             ErrorClass::Changed => Self::Step(Step::Withdrawn(Withdrawal::Changed)),
         }
     }

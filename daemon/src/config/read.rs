@@ -220,16 +220,17 @@ pub(crate) fn from_file(path: &Path) -> Result<Config, String> {
 /// As [`from_file`].
 pub(crate) fn whole(path: &Path) -> Result<Config, String> {
     let config = from_file(path)?;
-    config.check_memory().map_err(|what| {
-        let text = std::fs::read_to_string(path).unwrap_or_default();
-        // The one of the two that is there; the later one, if both are.
-        let at = ["memory", "workers"].map(|setting| place_of(&text, 0, setting)).into_iter().max().unwrap_or(0);
-        format!("{}: {}", path.display(), with_line(&text, at, &what))
-    })?;
-    roles::check(&config).and_then(|()| share::check(&config)).map_err(|what| {
-        let text = std::fs::read_to_string(path).unwrap_or_default();
-        format!("{}: {}", path.display(), with_line(&text, place_of(&text, 0, "roles"), &what))
-    })?;
+    let at = |settings: &'static [&'static str]| {
+        move |what: String| {
+            let text = std::fs::read_to_string(path).unwrap_or_default();
+            // The one of these that is there; the latest, if several are.
+            let at = settings.iter().map(|setting| place_of(&text, 0, setting)).max().unwrap_or(0);
+            format!("{}: {}", path.display(), with_line(&text, at, &what))
+        }
+    };
+    config.check_memory().map_err(at(&["memory", "workers"]))?;
+    roles::check(&config).map_err(at(&["roles"]))?;
+    share::check(&config).map_err(|what| format!("{}: {what}", path.display()))?;
     Ok(config)
 }
 

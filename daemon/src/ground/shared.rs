@@ -95,7 +95,7 @@ pub(super) fn same_view(root: &Path, name: &str) -> Result<(), FolderError> {
     other.map_or(Ok(()), |other| Err(FolderError::Called { root: root.to_owned(), name: name.to_owned(), other, noted }))
 }
 
-/// What another daemon noted, if that is something else; where nothing is, this is noted.
+/// The text that another daemon noted, if it differs from `own`, which is noted where there is none.
 fn agreed(noted: &Path, own: &str) -> Result<Option<String>, FolderError> {
     let read = || fsx::text_if_there(noted).map_err(FolderError::unseen(noted));
     let mut there = read()?;
@@ -107,7 +107,7 @@ fn agreed(noted: &Path, own: &str) -> Result<Option<String>, FolderError> {
             written.map_err(failed(noted, "cannot be written"))?;
         }
     }
-    Ok(there.map(|text| text.trim_end().to_owned()).filter(|text| text != own))
+    Ok(there.map(|text| text.strip_suffix('\n').unwrap_or(&text).to_owned()).filter(|text| text != own))
 }
 
 /// Is the folder one that daemons on several machines serve, or last served?
@@ -134,7 +134,7 @@ mod tests {
     fn a_shared_folder_has_one_keeper_and_is_nobodys_alone() {
         let dir = tempfile::tempdir().unwrap();
         let root = dir.path();
-        let (mut one, mut two) = (Ground::visit(root, "hot").unwrap(), Ground::visit(root, "hot").unwrap());
+        let (one, two) = (Ground::visit(root, "hot").unwrap(), Ground::visit(root, "hot").unwrap());
         assert!(one.try_keep().unwrap() && one.try_keep().unwrap());
         assert!(!two.try_keep().unwrap());
         assert!(matches!(Ground::take(root), Err(FolderError::Owned { .. })));
@@ -149,7 +149,7 @@ mod tests {
         Ground::visit(root, "hot").unwrap();
     }
 
-    /// One that serves it alone may have begun when nobody shared it.
+    /// A daemon that serves it alone may have begun when nobody shared it.
     #[test]
     fn a_folder_that_one_serves_alone_is_not_shared() {
         let dir = tempfile::tempdir().unwrap();
@@ -158,7 +158,7 @@ mod tests {
             assert!(matches!(Ground::visit(dir.path(), "hot"), Err(FolderError::Owned { .. })));
         }
         drop(alone);
-        let mut one = Ground::visit(dir.path(), "hot").unwrap();
+        let one = Ground::visit(dir.path(), "hot").unwrap();
         assert!(one.try_keep().unwrap(), "nobody has it by then");
     }
 

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use std::time::{Duration, Instant};
 
 use suture_store::job::{Area, Kind};
-use suture_store::{Control, Query, Role, StoreError};
+use suture_store::{Control, Job, Query, Role, StoreError};
 
 use super::{Keeper, Kept, LOOK_FOR, control};
 use crate::attempt::Context;
@@ -37,11 +37,28 @@ impl Keeper {
             each_job(&*context.store, &mut |job| new.iter_mut().for_each(|kept| kept.remember(job, now)))?;
             forget_noticed(context, &new)?;
         }
-        for kept in &mut self.folders {
-            kept.look_after(context, now)?;
+        self.hear_of_ends(now)?;
+        self.folders.iter_mut().try_for_each(|kept| kept.clear(&self.context, now))
+    }
+
+    /// Asks now and then which jobs of shared folders have ended on other machines.
+    fn hear_of_ends(&mut self, now: Instant) -> Result<(), StoreError> {
+        let pause = ASK_EVERY.max(self.hearing_takes * ASK_TIMES);
+        let mut shared: Vec<&mut Kept> = self.folders.iter_mut().filter(|kept| kept.is_kept && kept.folder.is_shared).collect();
+        if shared.is_empty() || !is_due(self.heard, now, pause) {
+            return Ok(());
         }
+        self.heard = Some(now);
+        let kinds = Kind::ALL.into_iter().filter(|kind| kind.is_live()).collect();
+        let live = self.context.store.list(&Query { kinds, ..Query::default() })?;
+        shared.iter_mut().try_for_each(|kept| kept.hear_of_ends(&self.context, &live, now))?;
+        self.hearing_takes = self.context.world.steady().duration_since(now);
         Ok(())
     }
+}
+
+fn is_due(then: Option<Instant>, now: Instant, every: Duration) -> bool {
+    then.is_none_or(|then| now.duration_since(then) >= every)
 }
 
 impl Kept {
@@ -52,18 +69,19 @@ impl Kept {
             return false;
         }
         self.is_kept = !self.folder.is_shared;
-        let is_due = self.asked.is_none_or(|then| now.duration_since(then) >= LOOK_FOR);
+        let (may, is_due) = (self.folder.is_shared && context.has(Role::Intake), is_due(self.asked, now, LOOK_FOR));
         // No other folder waits for a share that hangs.
-        if self.folder.is_shared && context.has(Role::Intake) && is_due && self.folder.answers() == Answer::Yes {
+        let asks = may && is_due && self.folder.answers() == Answer::Yes;
+        if asks {
             self.asked = Some(now);
             self.is_kept = self.folder.try_keep();
         }
-        if !self.is_kept && !std::mem::replace(&mut self.is_told, true) {
-            tracing::info!(folder = %self.folder.root.display(), "Another daemon looks for drops in the shared folder; this one works on its jobs.");
+        if !self.is_kept && (asks || !may) && !std::mem::replace(&mut self.is_told, true) {
+            tracing::info!(folder = %self.folder.root.display(), "Another daemon looks for drops in the shared folder.");
         }
         if self.is_kept && self.folder.is_shared {
             tracing::info!(folder = %self.folder.root.display(), "This daemon keeps the shared folder: it looks for drops.");
-            (self.dirty, self.heard, self.cleared) = (true, None, None);
+            (self.dirty, self.cleared) = (true, None);
             self.answering.clear();
             // The one that kept it before is gone, and with it whoever sent it files.
             uploads::clear(&self.folder);
@@ -85,14 +103,11 @@ impl Kept {
 
     /// A file that lies in `in/` while its job has ended elsewhere, and answers for it no longer, is a new drop. Orders with jobs that live are summed up
     /// once more.
-    fn hear_of_ends(&mut self, context: &Context, now: Instant) -> Result<(), StoreError> {
-        let kinds = Kind::ALL.into_iter().filter(|kind| kind.is_live()).collect();
+    fn hear_of_ends(&mut self, context: &Context, all: &[Job], now: Instant) -> Result<(), StoreError> {
         let mut live = BTreeSet::new();
-        for job in context.store.list(&Query { kinds, ..Query::default() })? {
-            if job.source.folder == self.folder.name {
-                self.orders.came(&job.source.path, job.id, now);
-                live.insert(job.id);
-            }
+        for job in all.iter().filter(|job| job.source.folder == self.folder.name) {
+            self.orders.came(&job.source.path, job.id, now);
+            live.insert(job.id);
         }
         for (path, id) in self.reconciler.with_jobs() {
             if live.contains(&id) || self.answering.contains(&id) {
@@ -111,18 +126,12 @@ impl Kept {
         Ok(())
     }
 
-    /// Asks now and then which jobs have ended elsewhere, and clears away what dead workers left.
-    fn look_after(&mut self, context: &Context, now: Instant) -> Result<(), StoreError> {
-        if !self.is_kept || !self.folder.is_shared {
+    /// Clears away now and then what dead workers left in a shared folder.
+    fn clear(&mut self, context: &Context, now: Instant) -> Result<(), StoreError> {
+        if !self.is_kept || !self.folder.is_shared || !is_due(self.cleared, now, CLEAR_EVERY) {
             return Ok(());
         }
-        let is_due = |then: Option<Instant>, every| then.is_none_or(|then| now.duration_since(then) >= every);
-        if is_due(self.heard, ASK_EVERY.max(self.hearing_takes * ASK_TIMES)) {
-            self.heard = Some(now);
-            self.hear_of_ends(context, now)?;
-            self.hearing_takes = context.world.steady().duration_since(now);
-        }
-        if is_due(self.cleared, CLEAR_EVERY) && self.folder.answers() == Answer::Yes && self.folder.check().is_ok() {
+        if self.folder.answers() == Answer::Yes && self.folder.check().is_ok() {
             self.cleared = Some(now);
             clear(context, &self.folder)?;
         }

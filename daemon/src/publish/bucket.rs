@@ -82,8 +82,7 @@ impl Desk<'_> {
     }
 
     fn original_key(&self, job: &Job) -> Result<String, PublishError> {
-        let (area, path) = job.original();
-        self.key(&self.folder.area(area).join(path.to_path()))
+        self.key(&self.folder.original(job))
     }
 
     fn stands(&self, shelf: &Shelf, job: &Job) -> Result<bool, PublishError> {

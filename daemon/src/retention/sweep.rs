@@ -151,8 +151,7 @@ impl Sweeper {
         let jobs = self.store.list(&Query { kinds, ..Query::default() })?;
         let places = |job: &Job| {
             let folder = self.folders.iter().find(|folder| folder.name == job.source.folder)?;
-            let (area, path) = job.original();
-            let original = (area != Area::In).then(|| folder.area(area).join(path.to_path()));
+            let original = (job.original().0 != Area::In).then(|| folder.original(job));
             Some(approved(&folder.root, job).into_iter().flatten().chain(original))
         };
         Ok(jobs.iter().filter_map(places).flatten().collect())

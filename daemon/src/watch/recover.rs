@@ -47,7 +47,7 @@ pub(crate) fn recover(context: &Arc<Context>) -> Result<(), StoreError> {
             Ok(_) => {}
         }
     }
-    // What lies in a folder that others serve, too, is cleared away by whoever keeps it.
+    // A folder that others serve, too, is cleared by whoever keeps it.
     for folder in context.folders.iter().filter(|folder| !folder.is_shared && folder.check().is_ok()) {
         uploads::clear(folder);
         clear(context, folder)?;

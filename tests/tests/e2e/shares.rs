@@ -64,7 +64,7 @@ fn assert_done(place: &Place, count: u64) {
     }
 }
 
-/// What it says when it does not begin.
+/// The words of a daemon that does not begin.
 fn refused(place: &Place, host: &str, words: &[&str], exit: i32) -> String {
     let mut arguments = vec!["watch".to_owned(), "--config".into(), format!("{host}.toml")];
     arguments.extend(words.iter().map(|word| (*word).to_owned()));
@@ -79,7 +79,10 @@ fn a_share_without_a_database_that_others_see_is_refused_in_a_line() {
             "[[folders]]\npath = \"share\"\nshared = true\n",
             "line 2, `path = \"share\"`: a folder that daemons on several machines serve",
         ),
-        ("state = \"s\"\n[[folders]]\npath = \"share\"\nshared = true\n", "the folder `share` is served by other daemons, too"),
+        (
+            "state = \"s\"\n[[folders]]\npath = \"share\"\nshared = true\n",
+            "wrong.toml: the folder `share` is served by other daemons, too",
+        ),
         ("state = \"share/s\"\n[[folders]]\npath = \"share\"\nshared = true\n", "`state` is of this machine alone"),
         ("state = \"s\"\n[[folders]]\npath = \"s3://farm\"\nshared = true\n", "leave `shared` out"),
     ] {

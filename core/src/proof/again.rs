@@ -38,7 +38,7 @@ struct Part {
 }
 
 /// Proves bounds where faces have changed, for the same `most`. O(n) with a small constant, and what [`super::prove`] takes for what has changed.
-pub(crate) fn prove_again(pairing: &Pairing<'_>, changes: &Changes<'_>, (most, tight): (f64, bool)) -> Verdict {
+pub(crate) fn prove_again(pairing: &Pairing<'_>, changes: &Changes<'_>, (most, enough): (f64, f64)) -> Verdict {
     let before = changes.verdict;
     let is_asked = asked(pairing, changes, most);
     let part = Part::new(pairing, &is_asked, changes, most);
@@ -52,7 +52,7 @@ pub(crate) fn prove_again(pairing: &Pairing<'_>, changes: &Changes<'_>, (most, t
         became: &part.became,
         open: &part.open,
     };
-    let verdict = prove_of(&own, Some(&Asked { first: &first, second: &second }), (most, tight));
+    let verdict = prove_of(&own, Some(&Asked { first: &first, second: &second }), (most, enough));
     let proved = Proved {
         forward: verdict.proved.forward.max(before.within[0]),
         backward: verdict.proved.backward.max(before.within[1]),

@@ -10,6 +10,7 @@ use crate::proof::fill::{Cut, Lists, Piece};
 use crate::proof::pairing::Pairing;
 use crate::proof::rim::{self, Rims};
 use crate::proof::surface::{Spot, Surface};
+use crate::proof::ways::Ways;
 
 /// The unit of sums of areas, as a share of a face: whole numbers, whose sum does not depend on their order.
 const UNIT: f64 = (1_u64 << 40) as f64;
@@ -48,6 +49,7 @@ pub(super) struct Map<'m> {
 #[derive(Default)]
 struct Scratch {
     chain: Lent,
+    ways: Ways,
     lists: Lists,
     /// Polygons: their faces, and the ends of their spots in the list.
     pieces: Vec<(u32, usize)>,
@@ -193,15 +195,21 @@ impl Map<'_> {
 
     /// Cuts a triangle that does not go into one face into pieces, in `lent`; returns how far its farthest corner or cut goes, if it can be mapped.
     fn cut(&self, (face, spots): ([u32; 3], [(Spot, f64); 3]), lent: &mut Scratch, found: &mut Found) -> Option<f64> {
-        let Scratch { chain, lists, pieces, spots: all } = lent;
+        let Scratch { chain, ways, lists, pieces, spots: all } = lent;
         let rim = &mut lists.rim;
         rim.clear();
         for (k, (from, to, turned)) in sides(self.pairing, face, spots).into_iter().enumerate() {
             rim.push(if turned { to } else { from });
             let start = rim.len();
-            let is_rim = self.rim.has(face[k], face[(k + 1) % 3]);
-            if !self.side(([&from, &to], is_rim), chain, rim, &mut found.rims) {
+            let [v, w] = [face[k], face[(k + 1) % 3]];
+            let (ends, is_rim) = ([v.min(w), v.max(w)], self.rim.has(v, w));
+            if let Some(pairs) = ways.of(ends) {
+                rim.extend_from_slice(pairs);
+            } else if !self.side(([&from, &to], is_rim), chain, rim, &mut found.rims) {
                 return None;
+            } else if !is_rim {
+                // Of the rim there is no triangle beyond.
+                ways.keep(ends, &rim[start..]);
             }
             if turned {
                 rim[start..].reverse();

@@ -26,6 +26,7 @@ mod search;
 mod surface;
 #[cfg(test)]
 mod tests;
+mod ways;
 
 pub(crate) use crate::proof::again::{Changes, prove_again};
 pub(crate) use crate::proof::pairing::Pairing;

@@ -27,6 +27,9 @@ const SAMPLE: usize = 8;
 const FARTHEST: usize = 500;
 const RINGS: usize = 3;
 
+/// The spot for a vertex, and how far that is.
+type Image = Option<(Spot, f64)>;
+
 /// Bounds of distances, in the unit of the points.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Proved {
@@ -56,16 +59,16 @@ pub(super) struct Asked<'a> {
     pub(super) second: &'a [bool],
 }
 
-/// Proves bounds, and names what is, or may be, farther than `most`. O(n) where the meshes are alike. If it is not to be `tight`, bounds are no
-/// better than `most`.
-pub(crate) fn prove(pairing: &Pairing<'_>, most: f64, tight: bool) -> Verdict {
-    prove_of(pairing, None, (most, tight))
+/// Proves bounds, and names what is, or may be, farther than `most`. O(n) where the meshes are alike. Bounds need not be lower
+/// than what is `enough`.
+pub(crate) fn prove(pairing: &Pairing<'_>, most: f64, enough: f64) -> Verdict {
+    prove_of(pairing, None, (most, enough))
 }
 
 /// Proves bounds of all, or of those that are asked about.
-pub(super) fn prove_of(pairing: &Pairing<'_>, asked: Option<&Asked<'_>>, (most, tight): (f64, bool)) -> Verdict {
+pub(super) fn prove_of(pairing: &Pairing<'_>, asked: Option<&Asked<'_>>, (most, enough): (f64, f64)) -> Verdict {
     let surface = Surface::new(pairing.new_points, pairing.new_faces);
-    let images: Vec<Option<(Spot, f64)>> =
+    let images: Vec<Image> =
         (0..pairing.points.len()).into_par_iter().with_min_len(BLOCK).map(|v| image(&surface, pairing, v)).collect();
     let mut images = with_better_ones(&surface, pairing, images);
     let rim = Rims::new(pairing);
@@ -80,7 +83,7 @@ pub(super) fn prove_of(pairing: &Pairing<'_>, asked: Option<&Asked<'_>>, (most, 
     // As vertices are about so far, no bound can be much better; where a bound is wanted, no better one is needed.
     let farthest_vertex = images.par_iter().flatten().map(|image| image.1).reduce(|| 0.0, f64::max);
     let least = (farthest_vertex * SLACK).max(rounding);
-    let aim = if most.is_finite() && !tight { most } else { least.min(most) };
+    let aim = least.max(enough).min(most);
     let map = Map {
         surface: &surface,
         pairing,
@@ -114,7 +117,7 @@ pub(super) fn prove_of(pairing: &Pairing<'_>, asked: Option<&Asked<'_>>, (most, 
 }
 
 /// The spot for a vertex: itself if it is still there, else the nearest one of those around what it became, and from there on.
-fn image(surface: &Surface<'_>, pairing: &Pairing<'_>, v: usize) -> Option<(Spot, f64)> {
+fn image(surface: &Surface<'_>, pairing: &Pairing<'_>, v: usize) -> Image {
     let became = *pairing.became.get(v)?;
     if became == NONE {
         return None;
@@ -134,11 +137,7 @@ fn image(surface: &Surface<'_>, pairing: &Pairing<'_>, v: usize) -> Option<(Spot
 }
 
 /// Looks wider for the farthest vertices: a walk may have ended where all around is farther, and not what is behind it.
-fn with_better_ones(
-    surface: &Surface<'_>,
-    pairing: &Pairing<'_>,
-    mut images: Vec<Option<(Spot, f64)>>,
-) -> Vec<Option<(Spot, f64)>> {
+fn with_better_ones(surface: &Surface<'_>, pairing: &Pairing<'_>, mut images: Vec<Image>) -> Vec<Image> {
     let mut distances: Vec<f64> = images.iter().flatten().step_by(SAMPLE).map(|image| image.1).collect();
     let rank = distances.len() - distances.len() / FARTHEST;
     if rank >= distances.len() {

@@ -115,8 +115,9 @@ impl<'a> Surface<'a> {
         if let Some(inner) = spots.iter().find(|spot| spot.is_inner()) {
             return holds(inner.face).then_some(inner.face);
         }
-        if holds(first.face) {
-            return Some(first.face);
+        // Spots on a way are each in the face that the way goes on from: the one in common is that of one of both, nearly always.
+        if let Some(one) = spots.iter().find(|spot| holds(spot.face)) {
+            return Some(one.face);
         }
         let k = first.shares.iter().position(|s| *s > 0.0)?;
         self.around(self.faces[first.face as usize][k]).iter().copied().find(|face| holds(*face))

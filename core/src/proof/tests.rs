@@ -42,7 +42,7 @@ fn a_mesh_is_at_no_distance_from_itself() {
         became: &became,
         open: &any_of(points.len()),
     };
-    let verdict = prove(&pairing, f64::INFINITY, true);
+    let verdict = prove(&pairing, f64::INFINITY, 0.0);
     assert_eq!((verdict.proved, verdict.far, verdict.under), (Proved::default(), Vec::new(), Vec::new()));
 }
 
@@ -61,7 +61,7 @@ fn a_tent_is_as_far_from_the_ground_as_it_is_high() {
         became: &became,
         open: &any_of(points.len()),
     };
-    let Verdict { proved, .. } = prove(&pairing, f64::INFINITY, true);
+    let Verdict { proved, .. } = prove(&pairing, f64::INFINITY, 0.0);
     assert!((proved.forward - 1.0).abs() < 1e-6, "{proved:?}");
     // 9∕√82 from the middle to a side.
     assert!(proved.backward >= 9.0 / 82.0_f64.sqrt() && proved.backward <= 1.0 + 1e-6, "{proved:?}");
@@ -81,7 +81,7 @@ fn what_is_not_covered_is_found() {
         became: &became,
         open: &any_of(points.len()),
     };
-    let Verdict { proved, .. } = prove(&pairing, f64::INFINITY, true);
+    let Verdict { proved, .. } = prove(&pairing, f64::INFINITY, 0.0);
     assert_eq!(proved.forward, 0.0);
     assert!((2.0..2.01).contains(&proved.backward), "{proved:?}");
 }
@@ -106,12 +106,12 @@ proptest! {
         let near = |i: u32| (i % 5).div_ceil(2) + (i / 5).div_ceil(2) * 3;
         let became: Vec<u32> = (0..25).map(|i| if random { became[i as usize] } else { near(i) }).collect();
         let pairing = Pairing { points: &points, faces: &faces, new_points: &new_points, new_faces: &new_faces, became: &became, open: &any_of(points.len()) };
-        let Verdict { proved, far, .. } = prove(&pairing, f64::INFINITY, true);
+        let Verdict { proved, far, .. } = prove(&pairing, f64::INFINITY, 0.0);
         let there = sampled(&points, &faces, (&new_points, &new_faces));
         let back = sampled(&new_points, &new_faces, (&points, &faces));
         prop_assert!(there <= proved.forward && back <= proved.backward, "{} {} {:?}", there, back, proved);
         prop_assert!(far.is_empty());
-        let Verdict { far, .. } = prove(&pairing, 0.5 * there, false);
+        let Verdict { far, .. } = prove(&pairing, 0.5 * there, 0.5 * there);
         prop_assert!(there == 0.0 || !far.is_empty());
     }
 }
@@ -135,11 +135,12 @@ proptest! {
         let became: Vec<u32> = (0..49_u32).map(|i| (i % 7).div_ceil(2) + (i / 7).div_ceil(2) * 4).collect();
         let open = any_of(points.len());
         let pairing = |new_points| Pairing { points: &points, faces: &faces, new_points, new_faces: &new_faces, became: &became, open: &open };
-        let verdict = prove(&pairing(&before), most, tight);
+        let enough = if tight { 0.0 } else { most };
+        let verdict = prove(&pairing(&before), most, enough);
         let is_under = |f: usize| verdict.under.contains(&(f as u32));
         let is_fresh: Vec<bool> = new_faces.iter().enumerate().map(|(f, face)| face.contains(&moved) || is_under(f)).collect();
         let gone = new_faces.iter().zip(&is_fresh).filter(|(_, is)| **is).map(|(face, _)| face.map(|v| before[v as usize])).collect();
-        let again = prove_again(&pairing(&after), &Changes { gone, is_fresh, verdict: &verdict }, (most, tight));
+        let again = prove_again(&pairing(&after), &Changes { gone, is_fresh, verdict: &verdict }, (most, enough));
         let there = sampled(&points, &faces, (&after, &new_faces));
         let back = sampled(&after, &new_faces, (&points, &faces));
         prop_assert!(there <= again.proved.forward && back <= again.proved.backward, "{} {} {:?}", there, back, again);
@@ -162,7 +163,7 @@ fn a_rim_goes_onto_the_rim() {
     let open = any_of(points.len());
     let pairing =
         Pairing { points: &points, faces: &faces, new_points: &new_points, new_faces: &new_faces, became: &became, open: &open };
-    let Verdict { proved, .. } = prove(&pairing, f64::INFINITY, true);
+    let Verdict { proved, .. } = prove(&pairing, f64::INFINITY, 0.0);
     assert!(proved.forward < 1e-9 && proved.backward < 1e-9 && proved.searched == 0, "{proved:?}");
 }
 
@@ -182,7 +183,7 @@ fn a_triangle_covers_vertices_of_a_finer_surface() {
             became: &became,
             open: &open,
         };
-        let Verdict { proved, .. } = prove(&pairing, f64::INFINITY, true);
+        let Verdict { proved, .. } = prove(&pairing, f64::INFINITY, 0.0);
         assert!(proved.forward < 1e-9 && proved.backward < 1e-9 && proved.searched == 0, "{proved:?}");
     }
 }
@@ -196,7 +197,7 @@ fn what_is_far_is_named_though_nothing_lies_on_it() {
     let (became, open) = ([0, 1, 2, 3], any_of(points.len()));
     let pairing =
         Pairing { points: &points, faces: &faces, new_points: &new_points, new_faces: &new_faces, became: &became, open: &open };
-    let Verdict { proved, far, under, .. } = prove(&pairing, 1.0, false);
+    let Verdict { proved, far, under, .. } = prove(&pairing, 1.0, 1.0);
     assert!(proved.backward >= 5.0, "{proved:?}");
     assert!(far.len() == 2 && (0..).zip(&far).all(|(f, one)| one.0 == f && one.1 > 4.999), "{far:?}");
     assert_eq!(under, [2]);

@@ -21,6 +21,13 @@ pub(super) struct Look {
     star: Star,
 }
 
+/// A cell as it was before it was changed.
+pub(super) struct Before {
+    pub(super) points: Vec<Point>,
+    /// The vertices of its triangles.
+    pub(super) corners: Vec<u32>,
+}
+
 /// The triangles of a cell and its obstacles, by numbers of their own for the vertices that they have.
 #[derive(Default)]
 struct Scene {
@@ -34,8 +41,8 @@ struct Scene {
 }
 
 impl Scene {
-    /// `vertices`: the numbers of the cell's vertices in the mesh, ascending; `was`: the triangles and the points as they were.
-    fn new(work: &Work, vertices: &[u32], was: &Patch) -> Self {
+    /// `vertices`: the numbers of the cell's vertices in the mesh, ascending.
+    fn new(work: &Work, vertices: &[u32], was: &Before) -> Self {
         let patch = &work.patch;
         let has_moved = |v: u32| patch.points[v as usize] != was.points[v as usize];
         let mut scene = Self::default();
@@ -48,7 +55,7 @@ impl Scene {
             *number
         };
         for (f, face) in patch.faces() {
-            scene.is_changed.push(was.face(f) != face || face.iter().any(|v| has_moved(*v)));
+            scene.is_changed.push(was.corners[3 * f..3 * f + 3] != face || face.iter().any(|v| has_moved(*v)));
             let face = face.map(|v| number(&mut scene, v));
             scene.triangles.push(face);
         }
@@ -96,8 +103,8 @@ impl Scene {
 
 impl Look {
     /// Does a triangle that was changed cross another one, or has a vertex that was moved come upon another one? `vertices`: their numbers in the mesh,
-    /// ascending; `was`: the triangles and the points as they were. O(n log n).
-    pub(super) fn is_crossed(&mut self, work: &Work, vertices: &[u32], was: &Patch) -> bool {
+    /// ascending. O(n log n).
+    pub(super) fn is_crossed(&mut self, work: &Work, vertices: &[u32], was: &Before) -> bool {
         let mut scene = Scene::new(work, vertices, was);
         if !scene.is_changed.contains(&true) {
             return false;
@@ -168,12 +175,12 @@ mod tests {
         let corners = vec![0, 2, 1, 0, 1, 3, 1, 2, 3, 2, 0, 3];
         let patch =
             |points: Vec<Point>| Patch::new(points, vec![Quadric::default(); 4], [vec![FREE; 4], vec![0; 4]], corners.clone());
-        let was = patch(points);
+        let was = Before { points: points.clone(), corners: corners.clone() };
         let [lo, hi] = EVERYWHERE;
         let shape = legal::Bounds { turn: 0.0, feature: -2.0 };
         let rules = Rules { shape, limits: [1.0; LIMITS], optimal: false };
         let obstacle = ([7, 8, 9], [[0.0, 0.0, 9.0], [4.0, 0.0, 9.0], [0.0, 4.0, 9.0]]);
-        let mut work = Work::new(was.clone(), Cell { lo, hi, start: 0, end: 4 }, (vec![obstacle], Vec::new()), rules, false);
+        let mut work = Work::new(patch(points), Cell { lo, hi, start: 0, end: 4 }, (vec![obstacle], Vec::new()), rules, false);
         work.patch.points[3] = to;
         Look::default().is_crossed(&work, &[0, 1, 2, 3], &was)
     }

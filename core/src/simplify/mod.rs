@@ -80,8 +80,8 @@ fn in_cells(input: &Input<'_>, options: &Options, cell: usize) -> Result<Outcome
     if !options.prove && options.max_deviation.is_none() {
         return Ok(measured(made.outcome(input), input, &bounds));
     }
-    let is_tight = options.tight || options.max_deviation.is_none();
-    let mut verdict = proof::prove(&made.pairing(input), most, is_tight);
+    let enough = options.enough.or(options.max_deviation.filter(|most| most.is_finite())).unwrap_or(0.0);
+    let mut verdict = proof::prove(&made.pairing(input), most, enough);
     let mut first = None;
     while verdict.proved.forward.max(verdict.proved.backward) > most {
         held.hold(input, &verdict.far, most);
@@ -90,7 +90,7 @@ fn in_cells(input: &Input<'_>, options: &Options, cell: usize) -> Result<Outcome
         }
         let first = first.get_or_insert_with(|| course.net(&held));
         let next = course.redo(&made, first, &held);
-        verdict = proof::prove_again(&next.pairing(input), &made.changes(&next, input, &verdict), (most, is_tight));
+        verdict = proof::prove_again(&next.pairing(input), &made.changes(&next, input, &verdict), (most, enough));
         made = next;
     }
     let mut outcome = made.outcome(input);

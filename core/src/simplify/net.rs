@@ -41,18 +41,13 @@ pub(super) struct Constraints<'a> {
 impl Net {
     /// O(n).
     pub(super) fn new(points: &[Point], faces: &[[u32; 3]], constraints: &Constraints<'_>) -> Self {
-        let (starts, corners) = corners_by_vertex(points.len(), faces);
-        let known = (0..points.len()).into_par_iter().with_min_len(1 << 10).map_init(Around::default, |around, v| {
-            let own = corners.get(starts[v] as usize..starts[v + 1] as usize).unwrap_or_default();
+        let known = of_vertices((points, faces), |v, around| {
+            let Some(around) = around else { return ((FIXED, true), Quadric::default()) };
             let is_fixed = constraints.fixed.get(v).copied().unwrap_or(false);
-            let Some(around) = around.of(points, faces, own) else { return ((FIXED, true), Quadric::default()) };
-            let rim = around.rim(constraints.feature);
-            let across = rim.iter().flat_map(|rim| rim.across).map(|n| n * RIM_WEIGHT.sqrt());
-            let quadric = Quadric::of_normals(around.normals().chain(across));
             let kind = if is_fixed { FIXED } else { kind(around, constraints.feature) };
-            ((kind, !around.is_closed()), quadric)
+            ((kind, !around.is_closed()), quadric(around, constraints.feature))
         });
-        let (known, quadrics): (Vec<(u8, bool)>, _) = known.unzip();
+        let (known, quadrics): (Vec<(u8, bool)>, Vec<Quadric>) = known.into_iter().unzip();
         let open = (0..).zip(&known).filter(|(_, known)| known.1).map(|(v, _)| v).collect();
         let kinds = known.into_iter().map(|known| known.0).collect();
         Self {
@@ -66,6 +61,30 @@ impl Net {
             open,
         }
     }
+
+    /// Gives all vertices the quadrics of the mesh as it is now: what it was before is forgotten. O(n).
+    pub(super) fn renew_quadrics(&mut self, feature: f64) {
+        let of = |_, around: Option<&Around>| around.map_or_else(Quadric::default, |around| quadric(around, feature));
+        self.quadrics = of_vertices((&self.points, &self.faces), of);
+    }
+}
+
+/// The planes of the triangles around a vertex, and of its rim.
+fn quadric(around: &Around, feature: f64) -> Quadric {
+    let rim = around.rim(feature);
+    let across = rim.iter().flat_map(|rim| rim.across).map(|n| n * RIM_WEIGHT.sqrt());
+    Quadric::of_normals(around.normals().chain(across))
+}
+
+/// Something of each vertex, by the triangles around it, if they are some in a row. O(n).
+fn of_vertices<T: Send>((points, faces): (&[Point], &[[u32; 3]]), of: impl Fn(usize, Option<&Around>) -> T + Sync) -> Vec<T> {
+    let (starts, corners) = corners_by_vertex(points.len(), faces);
+    let each = (0..points.len()).into_par_iter().with_min_len(1 << 10);
+    let of_one = |around: &mut Around, v: usize| {
+        let own = corners.get(starts[v] as usize..starts[v + 1] as usize).unwrap_or_default();
+        of(v, around.of(points, faces, own))
+    };
+    each.map_init(Around::default, of_one).collect()
 }
 
 fn kind(around: &Around, feature: f64) -> u8 {
@@ -92,6 +111,20 @@ mod tests {
         let net = Net::new(&points, &faces, &Constraints { fixed: &[], strict: &[], feature: 0.8 });
         assert_eq!(net.kinds, [FIXED, RIM, FIXED, RIM, FREE, RIM, FIXED, RIM, FIXED]);
         assert_eq!(net.open, [0, 1, 2, 3, 5, 6, 7, 8]);
+    }
+
+    /// A pyramid whose top was moved: its planes are those of the new sides, whatever they were.
+    #[test]
+    fn new_quadrics_are_those_of_the_mesh_as_it_is() {
+        let points = |top: f32| vec![[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [2.0, 2.0, 0.0], [0.0, 2.0, 0.0], [1.0, 1.0, top]];
+        let faces = [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4], [0, 2, 1], [0, 3, 2]];
+        let constraints = Constraints { fixed: &[], strict: &[], feature: -2.0 };
+        let mut net = Net::new(&points(1.0), &faces, &constraints);
+        let moved = Net::new(&points(3.0), &faces, &constraints);
+        net.points = points(3.0);
+        assert_ne!(net.quadrics, moved.quadrics);
+        net.renew_quadrics(-2.0);
+        assert_eq!(net.quadrics, moved.quadrics);
     }
 
     #[test]

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use crate::geometry::sums::Bounds;
 use crate::simplify::cell::{Obstacle, Rules, Work};
-use crate::simplify::crossed::Look;
+use crate::simplify::crossed::{Before, Look};
 use crate::simplify::net::Net;
 use crate::simplify::partition::{Partition, Planes};
 use crate::simplify::patch::{FIXED, Patch};
@@ -108,14 +108,20 @@ impl Parted {
         &self.faces[self.starts[c]..self.starts[c + 1]]
     }
 
+    /// The points and the triangles of a cell.
+    fn before(&self, net: &Net, c: usize) -> Before {
+        let points = self.vertices(c).iter().map(|v| net.points[*v as usize]).collect();
+        let corners = self.faces(c).iter().flat_map(|f| net.faces[*f as usize].map(|v| self.seats[v as usize].place)).collect();
+        Before { points, corners }
+    }
+
     fn patch(&self, net: &Net, c: usize) -> Patch {
+        let Before { points, corners } = self.before(net, c);
         let vertices = self.vertices(c);
-        let points = vertices.iter().map(|v| net.points[*v as usize]).collect();
         let quadrics = vertices.iter().map(|v| net.quadrics[*v as usize]).collect();
         let kind = |v: &u32| if self.is_shared[*v as usize] { FIXED } else { net.kinds[*v as usize] };
         let kinds = vertices.iter().map(kind).collect();
         let strict = vertices.iter().map(|v| net.strict[*v as usize]).collect();
-        let corners = self.faces(c).iter().flat_map(|f| net.faces[*f as usize].map(|v| self.seats[v as usize].place)).collect();
         Patch::new(points, quadrics, [kinds, strict], corners)
     }
 
@@ -160,7 +166,7 @@ pub(super) fn round(net: &mut Net, rules: Rules, planes: Planes, goal: Goal) -> 
         .with_max_len(1)
         .map_init(Look::default, |look, (c, work)| {
             let is_crossed =
-                work.patch.live < parted.faces(c).len() && look.is_crossed(work, parted.vertices(c), &parted.patch(net, c));
+                work.patch.live < parted.faces(c).len() && look.is_crossed(work, parted.vertices(c), &parted.before(net, c));
             if is_crossed {
                 let live = work.patch.live;
                 *work = parted.work(net, c, rules, true);

@@ -34,8 +34,8 @@ pub(crate) struct Options {
     pub optimal: bool,
     /// Bounds of the deviation are proved, also where none is wanted.
     pub prove: bool,
-    /// The proved bounds are as low as they can be; else where a deviation is wanted, none is lower than that.
-    pub tight: bool,
+    /// No proved bound needs to be lower than this; the deviation that is wanted, if it is `None` and there is one.
+    pub enough: Option<f64>,
 }
 
 impl Default for Options {
@@ -47,7 +47,7 @@ impl Default for Options {
             max_turn: 1.2,
             optimal: true,
             prove: true,
-            tight: false,
+            enough: None,
         }
     }
 }

@@ -94,7 +94,7 @@ fn places_that_miss_a_deviation_are_done_again() {
             became: &outcome.became,
             open: &open,
         };
-        let proved = [outcome.proved.unwrap(), proof::prove(&pairing, most, false).proved];
+        let proved = [outcome.proved.unwrap(), proof::prove(&pairing, most, most).proved];
         assert!(proved.iter().all(|proved| proved.forward.max(proved.backward) <= most), "{proved:?}");
         assert!(outcome.faces.len() < faces.len() / 3, "{}", outcome.faces.len());
         let four = with(4);

@@ -119,6 +119,12 @@ impl Plan {
         self.boxes.len()
     }
 
+    /// The plane of a node of the tree, whose root is 1 and whose node `i` has the parts `2i` below the plane and `2i + 1`: its axis, and the smallest
+    /// coordinate of the upper part. None of a chunk.
+    pub(crate) fn plane(&self, node: usize) -> Option<(usize, f32)> {
+        self.planes.get(node).map(|(axis, at)| (usize::from(*axis), *at))
+    }
+
     /// Bytes held.
     pub(crate) fn heap_bytes(&self) -> u64 {
         (self.chunks() * (size_of::<(u8, f32)>() + size_of::<HomeBox>())) as u64
@@ -256,7 +262,7 @@ fn best_plane(samples: &[Sample], cell: &HomeBox, shift: f64) -> (usize, f32) {
 }
 
 /// Moves what satisfies `first` to the front and returns how many that are.
-fn partition<T>(items: &mut [T], first: impl Fn(&T) -> bool) -> usize {
+pub(crate) fn partition<T>(items: &mut [T], first: impl Fn(&T) -> bool) -> usize {
     let mut n = 0;
     for i in 0..items.len() {
         if first(&items[i]) {

@@ -6,8 +6,7 @@
 use crate::engine::mesh::Mesh;
 use crate::io::record::Record;
 use crate::simplify::{self, Ended, Input, Options};
-use crate::stream::plan::{ChunkId, Plan};
-use crate::stream::source::{Seen, Source, Triangle};
+use crate::stream::plan::Plan;
 
 use super::super::change::encoded;
 
@@ -18,6 +17,8 @@ pub(super) struct Cell {
     corners: Vec<[[f32; 3]; 3]>,
     /// Which of them are its own.
     is_own: Vec<bool>,
+    /// Which of them go across a plane of an earlier pass, if only their corners may move.
+    is_across: Option<Vec<bool>>,
 }
 
 /// A cell after that.
@@ -31,22 +32,40 @@ pub(super) struct Made {
     /// The change of the volume.
     pub(super) volume: f64,
     pub(super) ended: Ended,
+    /// How many more triangles are left than were wanted.
+    pub(super) missed: usize,
 }
 
 impl Cell {
-    /// Of the triangles that a chunk of a plan sees.
-    pub(super) fn new(plan: &Plan, chunk: ChunkId, seen: [&Seen<'_>; 2]) -> Self {
-        let mut cell =
-            Self { within: plan.home_box(chunk).half_open(), numbers: Vec::new(), corners: Vec::new(), is_own: Vec::new() };
-        for source in seen {
-            source.for_each(|number, triangle| {
-                let corners = triangle.corners();
-                cell.numbers.push(number);
-                cell.is_own.push(corners.iter().all(|p| plan.home(*p) == chunk));
-                cell.corners.push(corners);
-            });
+    /// A half-open box in which nothing is yet, with room for so many triangles.
+    pub(super) fn new(within: [[f32; 3]; 2], room: usize) -> Self {
+        Self {
+            within,
+            numbers: Vec::with_capacity(room),
+            corners: Vec::with_capacity(room),
+            is_own: Vec::with_capacity(room),
+            is_across: None,
         }
-        cell
+    }
+
+    /// Only corners of triangles that go across a plane may move: of all others, an earlier pass made as few as was wanted, and no more is known of the surface
+    /// that they were.
+    pub(super) fn along(mut self, plan: &Plan) -> Self {
+        let is_across = |corners: &[[f32; 3]; 3]| {
+            let [a, b, c] = corners.map(|p| plan.home(p));
+            a != b || b != c
+        };
+        self.is_across = Some(self.corners.iter().map(is_across).collect());
+        self
+    }
+
+    /// Adds a triangle that reaches into it.
+    #[inline]
+    pub(super) fn add(&mut self, number: u32, corners: [[f32; 3]; 3]) {
+        let [lo, hi] = self.within;
+        self.numbers.push(number);
+        self.corners.push(corners);
+        self.is_own.push(corners.iter().all(|p| (0..3).all(|k| lo[k] <= p[k] && p[k] < hi[k])));
     }
 
     /// With so many of its own triangles left, if a count is wanted. What cannot be simplified stays.
@@ -55,17 +74,24 @@ impl Cell {
         if own == 0 || left.is_some_and(|left| left >= own) {
             return Made { ended: Ended::Count, ..Made::default() };
         }
-        let Ok(mesh) = Mesh::from_triangles(&self.corners) else { return Made::default() };
+        let unchanged = Made { missed: left.map_or(0, |left| own - left), ..Made::default() };
+        let Ok(mesh) = Mesh::from_triangles(&self.corners) else { return unchanged };
         let others = self.corners.len() - own;
+        let fixed = self.is_across.as_ref().map(|is_across| {
+            let mut fixed = vec![true; mesh.vertices().len()];
+            let across = mesh.faces().iter().zip(is_across).filter(|(_, is_across)| **is_across);
+            across.flat_map(|(face, _)| face).for_each(|v| fixed[*v as usize] = false);
+            fixed
+        });
         let input = Input {
             points: mesh.vertices(),
             faces: mesh.faces(),
             region: Some(&self.is_own),
-            fixed: None,
+            fixed: fixed.as_deref(),
             within: Some(self.within),
         };
         let options = Options { triangles: left.map(|left| left + others), ..*options };
-        let Ok(outcome) = simplify::simplify(&input, &options) else { return Made::default() };
+        let Ok(outcome) = simplify::simplify(&input, &options) else { return unchanged };
         let mut stays = vec![false; self.numbers.len()];
         outcome.origins.iter().for_each(|f| stays.iter_mut().skip(*f as usize).take(1).for_each(|stays| *stays = true));
         let gone = self.numbers.iter().zip(stays).filter(|(_, stays)| !stays).map(|(number, _)| *number).collect();
@@ -74,6 +100,7 @@ impl Cell {
         let proved = outcome.proved.unwrap_or_default();
         Made {
             gone,
+            missed: left.map_or(0, |left| outcome.faces.len().saturating_sub(left + others)),
             added: encoded(new.map(|(face, _)| face.map(place))),
             proved: [proved.forward, proved.backward],
             volume: outcome.volume[1] - outcome.volume[0],

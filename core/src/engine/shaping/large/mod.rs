@@ -1,4 +1,5 @@
-//! Fewer triangles of a mesh that is larger than memory: pass after pass, each over cells of space, and over cells that lie elsewhere.
+//! Fewer triangles of a mesh that is larger than memory: pass after pass, each over cells of space, and over strips along the seams of these cells, or over
+//! cells that lie elsewhere.
 //!
 //! **In:** the records of a mesh, and what a profile wants of it.
 //! **Out:** the triangles that go and come, and a bound of the distance both ways: the sum of the bounds of all passes, by the triangle inequality.
@@ -6,7 +7,9 @@
 //! threads, nor on memory: too little is a refusal.
 
 mod cell;
+mod cells;
 mod pass;
+mod strips;
 #[cfg(test)]
 mod tests;
 
@@ -24,26 +27,38 @@ use crate::geometry::sums::Bounds;
 use crate::io::record::{self, Record};
 use crate::output::edit::NewRecords;
 use crate::simplify::{Ended, MOST_DEVIATION};
+use crate::stream::plan::Plan;
 use crate::util::{bits, parallel};
-use pass::{BLOCK, Pass, Passed, Stop};
+use cells::{Parting, Stop};
+use pass::{Pass, Passed};
+use strips::BLOCK;
 
-/// A pass over cells.
-#[derive(Clone, Copy)]
-struct Turn {
-    /// How far the planes between cells are shifted.
-    shift: f64,
-    /// The share that it takes of the deviation that is left.
-    share: f64,
-    /// How many times as many triangles as are wanted it may leave.
-    margin: f64,
+/// The parts of space that a pass goes over.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Turn {
+    /// Cells.
+    First,
+    /// Strips along the seams of these cells.
+    Strips,
+    /// Cells whose planes lie elsewhere.
+    Shifted,
+    /// All as a single cell.
+    Whole,
 }
 
-/// The first pass takes the small part of the deviation, as the last one decides how many triangles are left. Its seams go in the second one, whose own
-/// seams are as the first one left them.
-const TURNS: [Turn; 2] = [Turn { shift: 0.0, share: 0.3, margin: 1.4 }, Turn { shift: -0.1, share: 1.0, margin: 1.0 }];
+impl Turn {
+    /// The share that it takes of the deviation that is left. The first one takes a small part of it, as more is wanted of the last one, of seams or of all.
+    fn share(self) -> f64 {
+        match self {
+            Self::First => 0.3,
+            Self::Strips => 0.5,
+            Self::Shifted | Self::Whole => 1.0,
+        }
+    }
+}
 
-/// The last pass where what is left is one cell.
-const WHOLE: Turn = Turn { shift: 0.0, share: 1.0, margin: 1.0 };
+/// How far the planes between [`Turn::Shifted`] cells are shifted.
+const SHIFT: f64 = -0.1;
 
 /// Counts of triangles.
 pub(super) struct Sizes {
@@ -92,6 +107,10 @@ struct Course<'a> {
     proved: [f64; 2],
     volume: f64,
     ended: Ended,
+    /// The last turn, the planes of the last cells, and how many more triangles were left in these than were wanted.
+    last: Option<Turn>,
+    plan: Option<Plan>,
+    missed: usize,
 }
 
 impl<'a> Course<'a> {
@@ -117,6 +136,9 @@ impl<'a> Course<'a> {
             proved: [0.0; 2],
             volume: 0.0,
             ended: Ended::default(),
+            last: None,
+            plan: None,
+            missed: 0,
         })
     }
 
@@ -126,46 +148,66 @@ impl<'a> Course<'a> {
     }
 
     fn run(mut self) -> std::result::Result<Change, Stop> {
-        let mut turns = TURNS.into_iter();
-        loop {
+        while let Some(turn) = self.next() {
             let before = self.current().len();
-            if self.wanted.is_some_and(|wanted| before <= wanted) {
-                break;
-            }
-            let next = turns.next();
-            // Where no count is wanted, the last turn has taken all of the deviation.
-            let is_whole = before <= self.sizes.whole && (next.is_some() || self.wanted.is_some());
-            let Some(turn) = (if is_whole { Some(WHOLE) } else { next }) else { break };
-            let passed = self.pass(turn, is_whole).run()?;
+            let passed = self.pass(turn).run()?;
             let after = passed.spool.0.records().len();
-            tracing::debug!("a pass: {before} triangles become {after}, proved within {:?}", passed.proved);
-            self.take(passed);
-            if is_whole {
-                break;
-            }
+            tracing::debug!("{turn:?}: {before} triangles become {after}, proved within {:?}", passed.proved);
+            self.take(turn, passed);
         }
         Ok(self.change())
     }
 
-    fn pass(&self, Turn { shift, share, margin }: Turn, is_whole: bool) -> Pass<'_> {
+    /// The next turn, if one is of use. What is one cell in the end is simplified by one measure for all of it.
+    fn next(&self) -> Option<Turn> {
+        let left = self.current().len();
+        if self.wanted.is_some_and(|wanted| left <= wanted) {
+            return None;
+        }
+        let whole = Some(Turn::Whole).filter(|_| left <= self.sizes.whole);
+        match self.last {
+            None => whole.or(Some(Turn::First)),
+            // Where cells are as small as they were to be, only seams are left.
+            Some(Turn::First) => {
+                let is_of_seams = self.wanted.is_some_and(|wanted| 3 * self.missed <= left - wanted);
+                whole.or(Some(if is_of_seams { Turn::Strips } else { Turn::Shifted }))
+            }
+            Some(Turn::Strips) => whole.or(Some(Turn::Shifted)),
+            // Where no count is wanted, it has taken all of the deviation.
+            Some(Turn::Shifted) => whole.filter(|_| self.wanted.is_some()),
+            Some(Turn::Whole) => None,
+        }
+    }
+
+    fn pass(&self, turn: Turn) -> Pass<'_> {
         let rest = (self.most - self.proved[0].max(self.proved[1])).max(0.0);
-        // What is one cell in the end is simplified by one measure for all of it: so much is left for that.
-        let least = if is_whole { 0 } else { self.sizes.whole / 10 * 9 };
+        let parting = match (turn, &self.plan) {
+            (Turn::Strips, Some(plan)) => Parting::Strips(self.sizes.cell, plan),
+            (Turn::First, _) => Parting::Shifted(self.sizes.cell, 0.0),
+            (Turn::Shifted | Turn::Strips, _) => Parting::Shifted(self.sizes.cell, SHIFT),
+            (Turn::Whole, _) => Parting::Shifted(u32::MAX, 0.0),
+        };
+        // So much is left for one cell in the end.
+        let least = if turn == Turn::Whole { 0 } else { self.sizes.whole / 10 * 9 };
         Pass {
             path: self.path,
             records: self.current(),
-            cell: if is_whole { u32::MAX } else { self.sizes.cell },
-            shift,
-            wanted: self.wanted.map(|wanted| ((wanted as f64 * margin) as usize).max(least)),
-            most: rest * share,
-            is_last: margin <= 1.0,
-            is_tight: self.work.profile.simplify_within_mm <= 0.0,
+            parting,
+            wanted: self.wanted.map(|wanted| wanted.max(least)),
+            most: rest * turn.share(),
+            is_of_all: turn != Turn::First,
+            enough: if self.work.profile.simplify_within_mm > 0.0 { rest * turn.share() } else { self.enough(turn) },
             work: self.work,
         }
     }
 
+    /// Bounds as low as they can be, but for strips: as they are a part of what is there, most of the bound is that of the turn before.
+    fn enough(&self, turn: Turn) -> f64 {
+        if turn == Turn::Strips { 0.4 * self.proved[0].max(self.proved[1]) } else { 0.0 }
+    }
+
     /// Goes on with what a pass left.
-    fn take(&mut self, passed: Passed) {
+    fn take(&mut self, turn: Turn, passed: Passed) {
         // The last ones before the pass were those of the input.
         let new = self.current().len() - self.survivors;
         let before = std::mem::take(&mut self.stays);
@@ -180,6 +222,7 @@ impl<'a> Course<'a> {
         }
         self.volume += passed.volume;
         self.ended = passed.ended;
+        (self.last, self.plan, self.missed) = (Some(turn), passed.plan, passed.missed);
         self.spool = Some(passed.spool);
     }
 

@@ -6,52 +6,33 @@ use std::path::Path;
 use rayon::prelude::*;
 
 use super::super::simplifying::BYTES_A_TRIANGLE;
-use super::cell::{Cell, Made};
+use super::cell::Made;
+use super::cells::{Cells, Parting, Stop};
+use super::strips::BLOCK;
 use crate::contract::error::{Error, Result as Failing};
 use crate::engine::nameless_stl::{self, Spooled};
 use crate::engine::work::Work;
-use crate::io::read_ahead::Guide;
-use crate::io::record::{self, Record};
+use crate::io::record::Record;
 use crate::simplify::{Ended, Options};
-use crate::stream::members::{Members, Reads};
-use crate::stream::plan::{ChunkId, Plan};
+use crate::stream::plan::Plan;
 use crate::util::{bits, parallel};
 
 /// So many cells for each thread at a time: some are done sooner than others.
 const CELLS_A_THREAD: usize = 2;
 
-/// Records that a thread looks at together, at least, or that are copied at once.
-pub(super) const BLOCK: usize = 1 << 14;
-
-/// Why nothing is simplified.
-#[derive(Debug)]
-pub(super) enum Stop {
-    Failed(Error),
-    Refused(String),
-}
-
-impl From<Error> for Stop {
-    fn from(error: Error) -> Self {
-        Self::Failed(error)
-    }
-}
-
 /// A pass that is to be made.
 pub(super) struct Pass<'a> {
     pub(super) path: &'a Path,
     pub(super) records: &'a [Record],
-    /// Triangles of a cell, about.
-    pub(super) cell: u32,
-    /// How far the planes are shifted.
-    pub(super) shift: f64,
+    pub(super) parting: Parting<'a>,
     /// Triangles to be left of all.
     pub(super) wanted: Option<usize>,
     /// The largest deviation that may be.
     pub(super) most: f64,
-    /// No pass over cells follows that could take from the seams of these what is still wanted.
-    pub(super) is_last: bool,
-    /// Bounds are to be as low as they can be.
-    pub(super) is_tight: bool,
+    /// It takes from its cells what is wanted of all, also where that is more than their share.
+    pub(super) is_of_all: bool,
+    /// No proved bound needs to be lower than this.
+    pub(super) enough: f64,
     pub(super) work: Work<'a>,
 }
 
@@ -66,75 +47,50 @@ pub(super) struct Passed {
     /// The change of the volume.
     pub(super) volume: f64,
     pub(super) ended: Ended,
-}
-
-/// The triangles by cells.
-struct Cells<'a> {
-    guide: Guide<'a>,
-    plan: Plan,
-    members: Members,
-    /// How many own triangles are to be left in each, if a count is wanted.
-    left: Option<Vec<usize>>,
+    /// How many more triangles are left in cells than were wanted there.
+    pub(super) missed: usize,
+    /// The planes between the cells.
+    pub(super) plan: Option<Plan>,
 }
 
 impl Pass<'_> {
     pub(super) fn run(&self) -> Result<Passed, Stop> {
-        let Work { limits, progress, .. } = self.work;
-        let guide = Guide::new(self.records.as_flattened(), limits);
-        let plan = Plan::shifted(self.records, &guide, self.cell, self.shift);
-        let members = Members::gather(self.path, (self.records, &guide), &plan, Some(0.0), limits, progress)?;
-        let left = self.wanted.map(|wanted| shares(&self.own(&plan), self.records.len(), (wanted, self.is_last)));
-        let cells = Cells { guide, plan, members, left };
+        let progress = self.work.progress;
+        let cells = Cells::new(self.path, self.records, self.parting, self.work)?;
+        // How many own triangles are to be left in each, if a count is wanted.
+        let left = self.wanted.map(|wanted| shares(&cells.own(), self.records.len(), (wanted, self.is_of_all)));
         let batches = self.batches(&cells)?;
         let mut stays = bits::all(self.records.len());
-        let (mut proved, mut volume, mut ended) = ([0.0_f64; 2], 0.0, Ended::Count);
+        let (mut proved, mut volume, mut ended, mut missed) = ([0.0_f64; 2], 0.0, Ended::Count, 0);
         let spool = nameless_stl::filled(self.path, self.records.len(), self.work, |append| {
             for batch in batches {
-                progress.at("simplify", u64::from(batch.start), cells.plan.chunks() as u64);
+                progress.at("simplify", u64::from(batch.start), cells.len() as u64);
                 if progress.cancelled() {
                     return Err(Error::cancelled(self.path, "simplify"));
                 }
-                for made in self.simplified(&cells, &batch) {
+                for made in self.simplified(&cells, left.as_deref(), &batch) {
                     append(&made.added)?;
                     made.gone.iter().for_each(|number| bits::take(&mut stays, *number as usize));
                     proved = [0, 1].map(|k| proved[k].max(made.proved[k]));
                     volume += made.volume;
                     ended = later(ended, made.ended);
+                    missed += made.missed;
                 }
             }
             self.append_what_stays(&stays, append)
         })?;
-        Ok(Passed { spool, stays, proved, volume, ended })
-    }
-
-    /// How many triangles are each cell's own: those with all corners there.
-    fn own(&self, plan: &Plan) -> Vec<usize> {
-        let none = || vec![0_usize; plan.chunks()];
-        let count = |mut counts: Vec<usize>, record: &Record| {
-            let [a, b, c] = record::corners(record).map(|p| plan.home(p));
-            if a == b && b == c {
-                counts.iter_mut().skip(a.0 as usize).take(1).for_each(|count| *count += 1);
-            }
-            counts
-        };
-        let add = |mut a: Vec<usize>, b: Vec<usize>| {
-            a.iter_mut().zip(b).for_each(|(sum, count)| *sum += count);
-            a
-        };
-        parallel::in_pool(self.work.limits.threads, || {
-            self.records.par_iter().with_min_len(BLOCK).fold(none, count).reduce(none, add)
-        })
+        Ok(Passed { spool, stays, proved, volume, ended, missed, plan: cells.into_plan() })
     }
 
     /// Cells in their order, some at a time, so that each batch has room in memory.
     fn batches(&self, cells: &Cells<'_>) -> Result<Vec<Range<u32>>, Stop> {
         let limits = self.work.limits;
-        let held = cells.members.heap_bytes(limits.threads) + cells.plan.heap_bytes() + self.records.len() as u64 / 4;
+        let held = cells.heap_bytes() + self.records.len() as u64 / 4;
         let room = limits.memory_bytes.saturating_sub(held);
         let most = limits.threads.max(1) * CELLS_A_THREAD;
         let (mut batches, mut sum): (Vec<Range<u32>>, u64) = (Vec::new(), 0);
-        for cell in 0..cells.plan.chunks() as u32 {
-            let bytes = cells.members.count(ChunkId(cell)) * BYTES_A_TRIANGLE;
+        for cell in 0..cells.len() as u32 {
+            let bytes = cells.count(cell) * BYTES_A_TRIANGLE;
             if bytes > room {
                 let [needed, given] = [held + bytes, limits.memory_bytes].map(|bytes| bytes.div_ceil(1 << 20));
                 let why = format!("it takes {needed} MiB of memory for the triangles of a part, and {given} MiB may be used");
@@ -152,25 +108,16 @@ impl Pass<'_> {
     }
 
     /// Simplifies some cells; in their order.
-    fn simplified(&self, cells: &Cells<'_>, batch: &Range<u32>) -> Vec<Made> {
+    fn simplified(&self, cells: &Cells<'_>, left: Option<&[usize]>, batch: &Range<u32>) -> Vec<Made> {
         let Work { profile, limits, .. } = self.work;
         let options = Options {
             max_deviation: Some(self.most),
             feature_angle: Some(profile.keep_edges_degrees.to_radians()),
-            tight: self.is_tight,
+            enough: Some(self.enough),
             ..Options::default()
         };
-        let Cells { guide, plan, members, left } = cells;
-        let of = (self.records, guide, plan);
-        let wanted = |chunk: ChunkId| batch.contains(&chunk.0);
-        let all = members.each(
-            of,
-            limits.threads,
-            (Reads::Chunks, wanted),
-            || (),
-            |(), chunk, members, visitors| Cell::new(plan, chunk, [members, visitors]),
-        );
-        let left = |at: usize| left.as_ref().and_then(|left| left.get(batch.start as usize + at)).copied();
+        let all = cells.read(batch);
+        let left = |at: usize| left.and_then(|left| left.get(batch.start as usize + at)).copied();
         parallel::in_pool(limits.threads, || {
             let each = all.into_par_iter().enumerate().with_max_len(1);
             each.map(|(at, cell)| cell.simplified(left(at), &options)).collect()
@@ -187,12 +134,12 @@ impl Pass<'_> {
     }
 }
 
-/// How many triangles are to be left of each cell's `own`, if so many of all are wanted: their share, or in the last pass so many fewer as seams have
-/// beyond theirs, but no less than half of it.
-fn shares(own: &[usize], all: usize, (wanted, is_last): (usize, bool)) -> Vec<usize> {
+/// How many triangles are to be left of each cell's `own`, if so many of all are wanted: their share, or, where what is wanted is taken `of all`, so many fewer
+/// as others have beyond theirs, but no less than half of it.
+fn shares(own: &[usize], all: usize, (wanted, is_of_all): (usize, bool)) -> Vec<usize> {
     let sum: usize = own.iter().sum();
     let share = (sum as u128 * wanted as u128 / all.max(1) as u128) as usize;
-    let left = if is_last { wanted.saturating_sub(all - sum).max(share / 2) } else { share };
+    let left = if is_of_all { wanted.saturating_sub(all - sum).max(share / 2) } else { share };
     own.iter().map(|own| (*own as u128 * left as u128 / sum.max(1) as u128) as usize).collect()
 }
 

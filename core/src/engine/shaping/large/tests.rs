@@ -118,21 +118,78 @@ fn seams_stay_in_a_pass_and_go_with_others() {
     let (limits, path) = (limits(2, 1 << 30), Path::new("torus.stl"));
     let work = Work { profile: &profile, limits: &limits, progress: &Quiet };
     let mut course = Course::new((path, &records), &SIZES[0], work).unwrap();
-    let passed = course.pass(TURNS[0], false).run().unwrap();
+    let passed = course.pass(Turn::First).run().unwrap();
     let plan = Plan::shifted(&records, &crate::io::read_ahead::Guide::new(records.as_flattened(), &limits), SIZES[0].cell, 0.0);
     let is_of_seam = |record: &Record| record::corners(record).windows(2).any(|two| plan.home(two[0]) != plan.home(two[1]));
     let seams: Vec<usize> = (0..records.len()).filter(|at| is_of_seam(&records[*at])).collect();
     assert!(seams.len() > 300 && seams.iter().all(|at| bits::holds(&passed.stays, *at)), "{}", seams.len());
     let stay: Vec<Record> = bits::ones(&passed.stays).map(|at| records[at as usize]).collect();
     assert!(passed.spool.0.records().ends_with(&stay) && stay.len() < records.len() / 3);
-    course.take(passed);
-    let next = course.pass(TURNS[1], false).run().unwrap();
-    course.take(next);
+    course.take(Turn::First, passed);
+    let next = course.pass(Turn::Strips).run().unwrap();
+    course.take(Turn::Strips, next);
     let left = seams.iter().filter(|at| bits::holds(&course.stays, **at)).count();
     assert!(left < seams.len() / 2, "{left} of {}", seams.len());
     assert_eq!(course.survivors, bits::count(&course.stays) as usize);
     let stay: Vec<Record> = bits::ones(&course.stays).map(|at| records[at as usize]).collect();
     assert!(course.current().ends_with(&stay), "what is left of the input is in its order");
+}
+
+/// A plane parts a finer torus. After the first pass only triangles around it are more than they are to be: nothing else is touched, no other corner moves, and
+/// the count is reached.
+#[test]
+fn the_second_pass_touches_what_is_near_to_seams_alone() {
+    let records = torus(160);
+    let profile = Profile { simplify_ratio: 0.2, ..Profile::default() };
+    let (limits, path) = (limits(2, 1 << 30), Path::new("torus.stl"));
+    let work = Work { profile: &profile, limits: &limits, progress: &Quiet };
+    let mut course = Course::new((path, &records), &Sizes { cell: 25_600, whole: 300 }, work).unwrap();
+    let first = course.pass(Turn::First).run().unwrap();
+    course.take(Turn::First, first);
+    let (axis, at) = course.plan.as_ref().and_then(|plan| plan.plane(1)).unwrap();
+    let before = course.current().len();
+    let wanted = simplifying::wanted(&profile, records.len()).unwrap();
+    assert!(before > wanted + 300 && before < wanted + 1000, "{before}: seams of two circles of 160 squares are too many");
+    assert_eq!(course.next(), Some(Turn::Strips));
+    let second = course.pass(Turn::Strips).run().unwrap();
+    // The torus is about eight wide.
+    let is_far = |record: &Record| record::corners(record).iter().all(|p| (p[axis] - at).abs() > 2.0);
+    let far: Vec<usize> = (0..before).filter(|i| is_far(&course.current()[*i])).collect();
+    assert!(far.len() > before / 3, "{} of {before}", far.len());
+    assert!(far.iter().all(|i| bits::holds(&second.stays, *i)));
+    // Corners of no triangle that goes across the plane: they stay where the first pass put them.
+    let is_across = |record: &&Record| {
+        record::corners(record).iter().any(|p| p[axis] < at) && record::corners(record).iter().any(|p| p[axis] >= at)
+    };
+    let places = |records: &[Record]| -> BTreeSet<[u32; 3]> {
+        records.iter().flat_map(record::corners).map(|p| p.map(f32::to_bits)).collect()
+    };
+    let across: Vec<Record> = course.current().iter().filter(is_across).copied().collect();
+    let stay: Vec<[u32; 3]> = places(course.current()).difference(&places(&across)).copied().collect();
+    course.take(Turn::Strips, second);
+    let left = places(course.current());
+    assert!(stay.len() > 1000 && stay.iter().all(|p| left.contains(p)), "{}", stay.len());
+    let after = course.current().len();
+    assert!(after <= wanted && after + 60 > wanted, "{after}");
+    assert_eq!(course.next(), None);
+    assert!(is_closed(&triangles(course.current())));
+}
+
+/// Where cells cannot become as small as they were to be, seams alone are not enough, and the next cells lie elsewhere.
+#[test]
+fn cells_go_on_where_seams_are_not_enough() {
+    let records = torus(50);
+    let profile = Profile { simplify_ratio: 0.2, simplify_within_mm: 0.002, ..Profile::default() };
+    let (limits, path) = (limits(2, 1 << 30), Path::new("torus.stl"));
+    let work = Work { profile: &profile, limits: &limits, progress: &Quiet };
+    let mut course = Course::new((path, &records), &SIZES[0], work).unwrap();
+    let first = course.pass(Turn::First).run().unwrap();
+    assert!(first.missed > 300, "{}", first.missed);
+    course.take(Turn::First, first);
+    assert_eq!(course.next(), Some(Turn::Shifted));
+    let told = run(&records, &SIZES[0], &profile, &limits).unwrap().told;
+    let Told::Simplified(told) = told else { panic!("another step") };
+    assert!(told.to_result.max(told.from_result) <= 0.002 && told.why_not.is_some(), "{told:?}");
 }
 
 #[test]

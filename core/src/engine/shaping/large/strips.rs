@@ -95,7 +95,9 @@ impl Strips {
             }
             _ => Some(f32::INFINITY),
         };
-        let [start, end] = half.map_or([at; 2], |half| [(at - half).max(within[0][axis]), (at + half).min(within[1][axis])]);
+        // The plane itself may lie in a strip of one that parts more.
+        let inside = |x: f32| x.max(within[0][axis]).min(within[1][axis]);
+        let [start, end] = half.map_or([at; 2], |half| [at - half, at + half]).map(inside);
         let (mut before, mut strip, mut behind) = (within, within, within);
         (before[1][axis], strip[0][axis], strip[1][axis], behind[0][axis]) = (start, start, end, end);
         let count = partition(samples, |s| s.hi[axis] < start);
@@ -106,7 +108,7 @@ impl Strips {
         let of_behind = &mut rest[..count];
         let behind = self.along((plan, 2 * number + 1), of_behind, behind, most);
         let low = self.along((plan, 2 * number), of_before, before, most);
-        let middle = if half.is_some() { self.in_pieces(of_strip, strip, most) } else { self.push(Node::Between) };
+        let middle = if start < end { self.in_pieces(of_strip, strip, most) } else { self.push(Node::Between) };
         let front = self.push(Node::Parted { axis, at: start, parts: [low, middle] });
         self.nodes[node as usize] = Node::Parted { axis, at: end, parts: [front, behind] };
         node

@@ -187,6 +187,13 @@ impl Plan {
         }
         ChunkId((node - self.planes.len()) as u32)
     }
+
+    /// The chunk in which all corners of a triangle lie, if they lie in one.
+    #[inline]
+    pub(crate) fn home_of_all(&self, corners: [[f32; 3]; 3]) -> Option<ChunkId> {
+        let [a, b, c] = corners.map(|p| self.home(p));
+        (a == b && b == c).then_some(a)
+    }
 }
 
 /// The extent of one sampled triangle.

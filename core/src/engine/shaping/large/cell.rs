@@ -11,14 +11,15 @@ use crate::stream::plan::Plan;
 use super::super::change::encoded;
 
 /// A cell before it is simplified.
-pub(super) struct Cell {
+pub(super) struct Cell<'a> {
     within: [[f32; 3]; 2],
+    /// The earlier pass of which this cell is along a seam. Only corners of triangles that go across one of its planes may move then: of all others that pass
+    /// left as few as are wanted, and the surface that they stand for is not known any more.
+    along: Option<&'a Plan>,
     numbers: Vec<u32>,
     corners: Vec<[[f32; 3]; 3]>,
     /// Which of them are its own.
     is_own: Vec<bool>,
-    /// Which of them go across a plane of an earlier pass, if only their corners may move.
-    is_across: Option<Vec<bool>>,
 }
 
 /// A cell after that.
@@ -36,27 +37,16 @@ pub(super) struct Made {
     pub(super) missed: usize,
 }
 
-impl Cell {
-    /// A half-open box in which nothing is yet, with room for so many triangles.
-    pub(super) fn new(within: [[f32; 3]; 2], room: usize) -> Self {
+impl<'a> Cell<'a> {
+    /// A half-open box in which nothing is yet, along a seam of an earlier pass if it is one, with room for so many triangles.
+    pub(super) fn new(within: [[f32; 3]; 2], along: Option<&'a Plan>, room: usize) -> Self {
         Self {
             within,
+            along,
             numbers: Vec::with_capacity(room),
             corners: Vec::with_capacity(room),
             is_own: Vec::with_capacity(room),
-            is_across: None,
         }
-    }
-
-    /// Only corners of triangles that go across a plane may move: of all others, an earlier pass made as few as was wanted, and no more is known of the surface
-    /// that they were.
-    pub(super) fn along(mut self, plan: &Plan) -> Self {
-        let is_across = |corners: &[[f32; 3]; 3]| {
-            let [a, b, c] = corners.map(|p| plan.home(p));
-            a != b || b != c
-        };
-        self.is_across = Some(self.corners.iter().map(is_across).collect());
-        self
     }
 
     /// Adds a triangle that reaches into it.
@@ -77,9 +67,9 @@ impl Cell {
         let unchanged = Made { missed: left.map_or(0, |left| own - left), ..Made::default() };
         let Ok(mesh) = Mesh::from_triangles(&self.corners) else { return unchanged };
         let others = self.corners.len() - own;
-        let fixed = self.is_across.as_ref().map(|is_across| {
+        let fixed = self.along.map(|plan| {
             let mut fixed = vec![true; mesh.vertices().len()];
-            let across = mesh.faces().iter().zip(is_across).filter(|(_, is_across)| **is_across);
+            let across = mesh.faces().iter().zip(&self.corners).filter(|(_, corners)| plan.home_of_all(**corners).is_none());
             across.flat_map(|(face, _)| face).for_each(|v| fixed[*v as usize] = false);
             fixed
         });

@@ -106,9 +106,8 @@ impl<'a> Cells<'a> {
         };
         let none = || vec![0_usize; plan.chunks()];
         let count = |mut counts: Vec<usize>, record: &Record| {
-            let [a, b, c] = record::corners(record).map(|p| plan.home(p));
-            if a == b && b == c {
-                counts.iter_mut().skip(a.0 as usize).take(1).for_each(|count| *count += 1);
+            if let Some(home) = plan.home_of_all(record::corners(record)) {
+                counts.iter_mut().skip(home.0 as usize).take(1).for_each(|count| *count += 1);
             }
             counts
         };
@@ -120,7 +119,7 @@ impl<'a> Cells<'a> {
     }
 
     /// Some cells in their order, with their triangles.
-    pub(super) fn read(&self, batch: &Range<u32>) -> Vec<Cell> {
+    pub(super) fn read(&self, batch: &Range<u32>) -> Vec<Cell<'_>> {
         match &self.kept {
             Kept::OfPlan(plan, members) => {
                 let wanted = |chunk: ChunkId| batch.contains(&chunk.0);
@@ -131,7 +130,7 @@ impl<'a> Cells<'a> {
                     (Reads::Chunks, wanted),
                     || (),
                     |(), chunk, members, visitors| {
-                        let mut cell = Cell::new(plan.home_box(chunk).half_open(), members.count() + visitors.count());
+                        let mut cell = Cell::new(plan.home_box(chunk).half_open(), None, members.count() + visitors.count());
                         for seen in [members, visitors] {
                             seen.for_each(|number, triangle| cell.add(number, triangle.corners()));
                         }
@@ -142,13 +141,13 @@ impl<'a> Cells<'a> {
             Kept::Strips(strips, plan) => {
                 let strips = strips.all().get(batch.start as usize..batch.end as usize).unwrap_or_default();
                 self.guide.ask_for(strips.iter().flat_map(|strip| &strip.members).map(|number| (*number, 1)));
-                strips.iter().map(|strip| self.strip(strip).along(plan)).collect()
+                strips.iter().map(|strip| self.strip(strip, plan)).collect()
             }
         }
     }
 
-    fn strip(&self, strip: &Strip) -> Cell {
-        let mut cell = Cell::new(strip.within, strip.members.len());
+    fn strip(&self, strip: &Strip, plan: &'a Plan) -> Cell<'a> {
+        let mut cell = Cell::new(strip.within, Some(plan), strip.members.len());
         strip.members.iter().for_each(|number| cell.add(*number, record::corners(&self.records[*number as usize])));
         cell
     }

@@ -167,7 +167,7 @@ impl<'a> Course<'a> {
         let whole = Some(Turn::Whole).filter(|_| left <= self.sizes.whole);
         match self.last {
             None => whole.or(Some(Turn::First)),
-            // Where cells are as small as they were to be, only seams are left.
+            // Where no more than a third of what is to go is of cells that could not become as small as they were to be, the rest is of seams.
             Some(Turn::First) => {
                 let is_of_seams = self.wanted.is_some_and(|wanted| 3 * self.missed <= left - wanted);
                 whole.or(Some(if is_of_seams { Turn::Strips } else { Turn::Shifted }))
@@ -189,21 +189,27 @@ impl<'a> Course<'a> {
         };
         // So much is left for one cell in the end.
         let least = if turn == Turn::Whole { 0 } else { self.sizes.whole / 10 * 9 };
+        let most = rest * turn.share();
         Pass {
             path: self.path,
             records: self.current(),
             parting,
             wanted: self.wanted.map(|wanted| wanted.max(least)),
-            most: rest * turn.share(),
+            most,
             is_of_all: turn != Turn::First,
-            enough: if self.work.profile.simplify_within_mm > 0.0 { rest * turn.share() } else { self.enough(turn) },
+            enough: self.enough(turn, most),
             work: self.work,
         }
     }
 
-    /// Bounds as low as they can be, but for strips: as they are a part of what is there, most of the bound is that of the turn before.
-    fn enough(&self, turn: Turn) -> f64 {
-        if turn == Turn::Strips { 0.4 * self.proved[0].max(self.proved[1]) } else { 0.0 }
+    /// The bound below which no lower one is searched for: the deviation that is wanted; where none is, bounds are as low as they can be, but in strips, as
+    /// most of the sum is of the turn before.
+    fn enough(&self, turn: Turn, most: f64) -> f64 {
+        match turn {
+            _ if self.work.profile.simplify_within_mm > 0.0 => most,
+            Turn::Strips => 0.4 * self.proved[0].max(self.proved[1]),
+            Turn::First | Turn::Shifted | Turn::Whole => 0.0,
+        }
     }
 
     /// Goes on with what a pass left.

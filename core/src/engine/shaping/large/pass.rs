@@ -1,4 +1,4 @@
-//! One pass: the cells of a plan, some at a time, each simplified by itself; what they leave follows on a new spool.
+//! One pass: cells, some at a time, each simplified by itself; what they leave follows on a new spool.
 
 use std::ops::Range;
 use std::path::Path;

@@ -1,5 +1,5 @@
 //! Strips of space along the planes of an earlier plan, as cells: in their midst lie the triangles that the earlier pass left as they were, since they go
-//! across a plane, and to both sides so many others that all of them together can become as large as triangles elsewhere.
+//! across a plane, and to both sides those at their corners, which change with them.
 //!
 //! Strips are half-open boxes that have nothing in common: a strip ends at those of planes that part more. All else stays as it is.
 
@@ -14,8 +14,8 @@ use crate::util::parallel;
 /// Records that a thread looks at together, at least, or that are copied at once.
 pub(super) const BLOCK: usize = 1 << 14;
 
-/// So many times as many triangles lie in a strip as go across its plane. With fewer, the seams stay finer than what is around; more cost more and change
-/// nothing.
+/// So many times as many triangles lie in a strip as go across its plane: these, and those at their corners, with room to spare. A corner stays where it is if
+/// one of its triangles lies outside.
 const WIDE: usize = 6;
 
 /// So many triangles tell how wide strips are, about.

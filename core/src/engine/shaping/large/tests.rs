@@ -37,6 +37,11 @@ fn run(records: &[Record], sizes: &Sizes, profile: &Profile, limits: &Limits) ->
     simplify((Path::new("torus.stl"), records), sizes, Work { profile, limits, progress: &Quiet }).unwrap()
 }
 
+/// A course that has made no pass yet.
+fn course<'a>((records, sizes): (&'a [Record], &'a Sizes), profile: &'a Profile, limits: &'a Limits) -> Course<'a> {
+    Course::new((Path::new("torus.stl"), records), sizes, Work { profile, limits, progress: &Quiet }).unwrap()
+}
+
 /// The triangles after a change.
 fn after(records: &[Record], change: &Change) -> Vec<Record> {
     let stays = (0..).zip(records).filter(|(at, _)| !bits::holds(&change.gone, *at)).map(|(_, record)| record);
@@ -115,9 +120,8 @@ fn the_result_depends_on_neither_threads_nor_memory() {
 fn seams_stay_in_a_pass_and_go_with_others() {
     let records = torus(50);
     let profile = Profile { simplify_ratio: 0.2, ..Profile::default() };
-    let (limits, path) = (limits(2, 1 << 30), Path::new("torus.stl"));
-    let work = Work { profile: &profile, limits: &limits, progress: &Quiet };
-    let mut course = Course::new((path, &records), &SIZES[0], work).unwrap();
+    let limits = limits(2, 1 << 30);
+    let mut course = course((&records, &SIZES[0]), &profile, &limits);
     let passed = course.pass(Turn::First).run().unwrap();
     let plan = Plan::shifted(&records, &crate::io::read_ahead::Guide::new(records.as_flattened(), &limits), SIZES[0].cell, 0.0);
     let is_of_seam = |record: &Record| record::corners(record).windows(2).any(|two| plan.home(two[0]) != plan.home(two[1]));
@@ -141,9 +145,8 @@ fn seams_stay_in_a_pass_and_go_with_others() {
 fn the_second_pass_touches_what_is_near_to_seams_alone() {
     let records = torus(160);
     let profile = Profile { simplify_ratio: 0.2, ..Profile::default() };
-    let (limits, path) = (limits(2, 1 << 30), Path::new("torus.stl"));
-    let work = Work { profile: &profile, limits: &limits, progress: &Quiet };
-    let mut course = Course::new((path, &records), &Sizes { cell: 25_600, whole: 300 }, work).unwrap();
+    let limits = limits(2, 1 << 30);
+    let mut course = course((&records, &Sizes { cell: 25_600, whole: 300 }), &profile, &limits);
     let first = course.pass(Turn::First).run().unwrap();
     course.take(Turn::First, first);
     let (axis, at) = course.plan.as_ref().and_then(|plan| plan.plane(1)).unwrap();
@@ -180,9 +183,8 @@ fn the_second_pass_touches_what_is_near_to_seams_alone() {
 fn cells_go_on_where_seams_are_not_enough() {
     let records = torus(50);
     let profile = Profile { simplify_ratio: 0.2, simplify_within_mm: 0.002, ..Profile::default() };
-    let (limits, path) = (limits(2, 1 << 30), Path::new("torus.stl"));
-    let work = Work { profile: &profile, limits: &limits, progress: &Quiet };
-    let mut course = Course::new((path, &records), &SIZES[0], work).unwrap();
+    let limits = limits(2, 1 << 30);
+    let mut course = course((&records, &SIZES[0]), &profile, &limits);
     let first = course.pass(Turn::First).run().unwrap();
     assert!(first.missed > 300, "{}", first.missed);
     course.take(Turn::First, first);

@@ -163,25 +163,32 @@ pub(crate) fn is_closed_fan(rings: &mut [[u32; 2]]) -> bool {
 
 /// Puts the sides of a fan of different vertices in order, and tells how they hang together.
 fn in_order(rings: &mut [[u32; 2]]) -> Fan {
+    // Nearly all are closed, and can begin anywhere.
+    if rings.len() > 2 && follow_each_other(rings) && rings[rings.len() - 1][1] == rings[0][0] {
+        return Fan::Closed;
+    }
     let is_first = |i: &usize| rings.iter().all(|ring| ring[1] != rings[*i][0]);
     let mut starts = (0..rings.len()).filter(is_first);
     let start = starts.next();
     if starts.next().is_some() {
         return Fan::Other;
     }
-    rings.swap(0, start.unwrap_or(0));
-    let first = rings[0][0];
+    let Some(start) = start else { return Fan::Other };
+    rings.swap(0, start);
+    let is_open = follow_each_other(rings) && rings.iter().all(|ring| ring[0] != rings[rings.len() - 1][1]);
+    if is_open { Fan::Open } else { Fan::Other }
+}
+
+/// Puts sides in order from the first on: each begins where the one before ends, and no other one does, nor does the first one. False if they cannot be.
+fn follow_each_other(rings: &mut [[u32; 2]]) -> bool {
+    let Some([first, _]) = rings.first().copied() else { return false };
     for i in 0..rings.len() - 1 {
         let wanted = rings[i][1];
         let mut next = (i + 1..rings.len()).filter(|j| rings[*j][0] == wanted);
-        let (Some(one), None, false) = (next.next(), next.next(), wanted == first) else { return Fan::Other };
+        let (Some(one), None, false) = (next.next(), next.next(), wanted == first) else { return false };
         rings.swap(i + 1, one);
     }
-    let last = rings[rings.len() - 1][1];
-    if last == first {
-        return if rings.len() > 2 { Fan::Closed } else { Fan::Other };
-    }
-    if start.is_some() && rings.iter().all(|ring| ring[0] != last) { Fan::Open } else { Fan::Other }
+    true
 }
 
 #[cfg(test)]

@@ -52,6 +52,11 @@ impl BoxTree {
         self.wide.each_meeting(wanted, visit);
     }
 
+    /// Does any box meet `wanted`?
+    pub(crate) fn meets(&self, wanted: &Bounds) -> bool {
+        self.wide.any_meeting(wanted, |_| true)
+    }
+
     /// Replaces `found` by the parts of the tree, of a few boxes each, that `wanted` meets, unless they are more than `most`; says whether they are not.
     pub(super) fn leaves_meeting(&self, wanted: &Bounds, most: usize, found: &mut Vec<u32>) -> bool {
         self.wide.leaves_meeting(wanted, most, found)

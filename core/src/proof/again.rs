@@ -78,11 +78,7 @@ fn around(triangle: &Triangle, reach: f64) -> Bounds {
 fn asked(pairing: &Pairing<'_>, changes: &Changes<'_>, most: f64) -> Vec<bool> {
     let boxes: Vec<Bounds> = changes.gone.iter().map(|t| Bounds::of(t)).collect();
     let tree = BoxTree::new(&boxes);
-    let is_near = |face: &[u32; 3]| {
-        let mut is_met = false;
-        tree.each_meeting(&around(&face.map(|v| pairing.points[v as usize]), most), |_| is_met = true);
-        is_met
-    };
+    let is_near = |face: &[u32; 3]| tree.meets(&around(&face.map(|v| pairing.points[v as usize]), most));
     let mut is_asked: Vec<bool> = pairing.faces.par_iter().with_min_len(BLOCK).map(is_near).collect();
     changes.verdict.far.iter().for_each(|(f, _)| is_asked[*f as usize] = true);
     is_asked
@@ -116,10 +112,8 @@ impl Part {
             asked.iter().map(|f| around(&pairing.faces[*f as usize].map(|v| pairing.points[v as usize]), most)).collect();
         let tree = BoxTree::new(&boxes);
         let is_near = |f: u32| {
-            let mut is_met = changes.is_fresh[f as usize];
             let face = pairing.new_faces[f as usize].map(|v| pairing.new_points[v as usize]);
-            tree.each_meeting(&Bounds::of(&face), |_| is_met = true);
-            is_met
+            changes.is_fresh[f as usize] || tree.meets(&Bounds::of(&face))
         };
         let near: Vec<u32> =
             (0..pairing.new_faces.len() as u32).into_par_iter().with_min_len(BLOCK).filter(|f| is_near(*f)).collect();

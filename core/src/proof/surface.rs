@@ -145,25 +145,77 @@ impl<'a> Surface<'a> {
     /// The spot of a face that is nearest to a place, and the square of its distance.
     #[inline]
     pub(super) fn nearest(&self, face: u32, p: DVec3) -> (Spot, f64) {
-        let [a, b, c] = self.corners(face);
-        let normal = (b - a).cross(c - a);
-        let square = normal.length_squared();
-        let inner = [(b, c), (c, a), (a, b)].map(|(u, v)| (v - u).cross(p - u).dot(normal));
-        if square > 0.0 && inner.iter().all(|x| *x > 0.0) {
-            let sum = inner[0] + inner[1] + inner[2];
-            let height = normal.dot(p - a);
-            return (Spot { face, shares: inner.map(|x| x / sum) }, height * height / square);
+        let corners = self.corners(face);
+        let shares = shares_of_nearest(&corners, p);
+        let [a, b, c] = corners;
+        let spot = a * shares[0] + b * shares[1] + c * shares[2];
+        (Spot { face, shares }, p.distance_squared(spot))
+    }
+}
+
+/// The shares of a triangle's corners in the place of it that is nearest to another one: by the region in which that lies, with one division (Ericson,
+/// "Real-Time Collision Detection", 2005, section 5.1.5).
+#[inline]
+fn shares_of_nearest([a, b, c]: &[DVec3; 3], p: DVec3) -> [f64; 3] {
+    let (ab, ac) = (*b - *a, *c - *a);
+    let [(a_b, a_c), (b_b, b_c), (c_b, c_c)] = [a, b, c].map(|corner| (ab.dot(p - *corner), ac.dot(p - *corner)));
+    if a_b <= 0.0 && a_c <= 0.0 {
+        return [1.0, 0.0, 0.0];
+    }
+    if b_b >= 0.0 && b_c <= b_b {
+        return [0.0, 1.0, 0.0];
+    }
+    if c_c >= 0.0 && c_b <= c_c {
+        return [0.0, 0.0, 1.0];
+    }
+    let inner = [b_b * c_c - c_b * b_c, c_b * a_c - a_b * c_c, a_b * b_c - b_b * a_c];
+    if inner.iter().all(|x| *x > 0.0) {
+        let share = (inner[0] + inner[1] + inner[2]).recip();
+        return inner.map(|x| x * share);
+    }
+    let (from_b, from_c) = (b_c - b_b, c_b - c_c);
+    let (sides, t) = if inner[2] <= 0.0 && a_b >= 0.0 && b_b <= 0.0 {
+        ([0, 1], a_b / (a_b - b_b))
+    } else if inner[1] <= 0.0 && a_c >= 0.0 && c_c <= 0.0 {
+        ([0, 2], a_c / (a_c - c_c))
+    } else if inner[0] <= 0.0 && from_b >= 0.0 && from_c >= 0.0 {
+        ([1, 2], from_b / (from_b + from_c))
+    } else {
+        ([0, 1], f64::NAN)
+    };
+    let mut shares = [0.0; 3];
+    if t >= 0.0 && t <= 1.0 {
+        (shares[sides[0]], shares[sides[1]]) = (1.0 - t, t);
+        return shares;
+    }
+    // A triangle without an area, or nearly.
+    let sides = [(a, b, [0, 1]), (b, c, [1, 2]), (c, a, [2, 0])].map(|(u, v, sides)| {
+        let t = share_along(p, *u, *v);
+        ((p - *u - (*v - *u) * t).length_squared(), t, sides)
+    });
+    let best = sides[1..].iter().fold(sides[0], |best, other| if other.0 < best.0 { *other } else { best });
+    (shares[best.2[0]], shares[best.2[1]]) = (1.0 - best.1, best.1);
+    shares
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::geometry::distance::nearest_of_triangle;
+
+    proptest! {
+        /// Also for triangles that are flat, or a point.
+        #[test]
+        fn no_place_of_a_triangle_is_nearer(own in prop::array::uniform9(-5i8..6), p in prop::array::uniform3(-9i8..10)) {
+            let place = |k: usize| DVec3::from_array([0, 1, 2].map(|l: usize| f64::from(own[3 * k + l])));
+            let (triangle, p) = ([place(0), place(1), place(2)], DVec3::from_array(p.map(f64::from)));
+            let shares = shares_of_nearest(&triangle, p);
+            prop_assert!(shares.iter().all(|share| *share >= 0.0) && (shares.iter().sum::<f64>() - 1.0).abs() < 1e-12, "{shares:?}");
+            let spot = triangle[0] * shares[0] + triangle[1] * shares[1] + triangle[2] * shares[2];
+            let truth = nearest_of_triangle(&triangle, p).distance(p);
+            prop_assert!((spot.distance(p) - truth).abs() < 1e-9, "{} {truth}", spot.distance(p));
         }
-        let mut best = (Spot { face, shares: [1.0, 0.0, 0.0] }, f64::INFINITY);
-        for (k, (u, v)) in [(a, b), (b, c), (c, a)].into_iter().enumerate() {
-            let t = share_along(p, u, v);
-            let distance = (p - u - (v - u) * t).length_squared();
-            if distance < best.1 {
-                let mut shares = [0.0; 3];
-                (shares[k], shares[(k + 1) % 3]) = (1.0 - t, t);
-                best = (Spot { face, shares }, distance);
-            }
-        }
-        best
     }
 }

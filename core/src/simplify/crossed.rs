@@ -4,8 +4,11 @@
 use std::collections::BTreeMap;
 
 use crate::algorithms::fans::is_closed_fan;
+use crate::geometry::boxes::BoxTree;
 use crate::geometry::collinear::is_collinear;
 use crate::geometry::exact::Point;
+use crate::geometry::sums::Bounds;
+use crate::geometry::tri_tri::Triangle;
 use crate::simplify::cell::Work;
 use crate::simplify::patch::{CREASE, Patch, Star};
 use crate::stream::plan::HomeBox;
@@ -28,6 +31,9 @@ pub(super) struct Before {
     pub(super) corners: Vec<u32>,
 }
 
+/// Where fewer than one of so many triangles have changed, those that are apart from them are not looked at.
+const FEW: usize = 8;
+
 /// The triangles of a cell and its obstacles, by numbers of their own for the vertices that they have.
 #[derive(Default)]
 struct Scene {
@@ -41,10 +47,19 @@ struct Scene {
 }
 
 impl Scene {
-    /// `vertices`: the numbers of the cell's vertices in the mesh, ascending.
-    fn new(work: &Work, vertices: &[u32], was: &Before) -> Self {
+    /// All of them, or where few have changed, those and what their boxes meet; `None` if none has. `vertices`: the numbers of the cell's vertices in the
+    /// mesh, ascending.
+    fn new(work: &Work, vertices: &[u32], was: &Before) -> Option<Self> {
         let patch = &work.patch;
         let has_moved = |v: u32| patch.points[v as usize] != was.points[v as usize];
+        let is_changed = |f: usize, face: [u32; 3]| was.corners[3 * f..3 * f + 3] != face || face.iter().any(|v| has_moved(*v));
+        let changed = patch.faces().filter(|(f, face)| is_changed(*f, *face));
+        let changed: Vec<Bounds> = changed.map(|(_, face)| Bounds::of(&patch.triangle(face))).collect();
+        if changed.is_empty() {
+            return None;
+        }
+        let tree = (FEW * changed.len() < patch.live).then(|| BoxTree::new(&changed));
+        let is_near = |triangle: &Triangle| tree.as_ref().is_none_or(|tree| tree.meets(&Bounds::of(triangle)));
         let mut scene = Self::default();
         let (mut numbers, mut beyond) = (vec![NONE; patch.points.len()], BTreeMap::new());
         let mut number = |scene: &mut Self, v: u32| {
@@ -54,12 +69,12 @@ impl Scene {
             }
             *number
         };
-        for (f, face) in patch.faces() {
-            scene.is_changed.push(was.corners[3 * f..3 * f + 3] != face || face.iter().any(|v| has_moved(*v)));
+        for (f, face) in patch.faces().filter(|(_, face)| is_near(&patch.triangle(*face))) {
+            scene.is_changed.push(is_changed(f, face));
             let face = face.map(|v| number(&mut scene, v));
             scene.triangles.push(face);
         }
-        for (face, triangle) in &work.obstacles {
+        for (face, triangle) in work.obstacles.iter().filter(|(_, triangle)| is_near(triangle)) {
             let face = [0, 1, 2].map(|k: usize| match vertices.binary_search(&face[k]) {
                 Ok(v) => number(&mut scene, v as u32),
                 Err(_) => *beyond.entry(face[k]).or_insert_with(|| scene.add(NONE, triangle[k], false)),
@@ -67,7 +82,14 @@ impl Scene {
             scene.is_changed.push(false);
             scene.triangles.push(face);
         }
-        scene
+        Some(scene)
+    }
+
+    /// How many of its triangles each vertex has.
+    fn counts(&self) -> Vec<usize> {
+        let mut counts = vec![0; self.own.len()];
+        self.triangles.iter().flatten().for_each(|v| counts[*v as usize] += 1);
+        counts
     }
 
     /// Adds a vertex, and numbers it.
@@ -105,10 +127,7 @@ impl Look {
     /// Does a triangle that was changed cross another one, or has a vertex that was moved come upon another one? `vertices`: their numbers in the mesh,
     /// ascending. O(n log n).
     pub(super) fn is_crossed(&mut self, work: &Work, vertices: &[u32], was: &Before) -> bool {
-        let mut scene = Scene::new(work, vertices, was);
-        if !scene.is_changed.contains(&true) {
-            return false;
-        }
+        let Some(mut scene) = Scene::new(work, vertices, was) else { return false };
         let same = self.weld(&scene.positions);
         let are_apart = self.weld.positions().len() == scene.positions.len();
         if !are_apart {
@@ -128,8 +147,9 @@ impl Look {
         // Where vertices coincide, nothing is known of their stars.
         let mut standing = vec![Standing::Irregular; positions.len()];
         if are_apart {
-            for (standing, v) in standing.iter_mut().zip(&scene.own) {
-                if *v != NONE && is_regular(&work.patch, *v, &mut self.star) {
+            for ((standing, v), count) in standing.iter_mut().zip(&scene.own).zip(scene.counts()) {
+                let is_whole = || count == work.patch.count(*v);
+                if *v != NONE && is_whole() && is_regular(&work.patch, *v, &mut self.star) {
                     *standing = Standing::Regular;
                 }
             }

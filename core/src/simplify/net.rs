@@ -47,7 +47,7 @@ impl Net {
             let kind = if is_fixed { FIXED } else { kind(around, constraints.feature) };
             ((kind, !around.is_closed()), quadric(around, constraints.feature))
         });
-        let (known, quadrics): (Vec<(u8, bool)>, Vec<Quadric>) = known.into_iter().unzip();
+        let (known, quadrics): (Vec<(u8, bool)>, Vec<Quadric>) = known.into_par_iter().unzip();
         let open = (0..).zip(&known).filter(|(_, known)| known.1).map(|(v, _)| v).collect();
         let kinds = known.into_iter().map(|known| known.0).collect();
         Self {

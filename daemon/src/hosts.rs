@@ -1,6 +1,6 @@
 //! Daemons that share this one's store, and what waits for one that is not there: for pages, programs and metrics alike.
 
-use suture_store::{Filter, Host, JobStore, Kind, Look, StoreError, Time};
+use suture_store::{Filter, Host, JobStore, Kind, Look, Role, StoreError, Time};
 
 use crate::attempt::Context;
 use crate::say::plain;
@@ -26,10 +26,11 @@ pub(crate) fn or_this(hosts: Vec<Host>, context: &Context) -> Vec<Host> {
         return hosts;
     }
     let config = context.settings.now();
+    let folders: Vec<String> = context.folders.iter().map(|folder| folder.name.clone()).collect();
     vec![Host {
         daemon: daemon_name(&config.state),
-        station: station(&config),
-        folders: context.folders.iter().map(|folder| folder.name.clone()).collect(),
+        station: station(&config, folders.clone()),
+        folders,
         began: Time(context.bus.life),
         seen: context.world.wall(),
         is_alive: true,
@@ -57,20 +58,30 @@ pub(crate) fn line(host: &Host) -> String {
     let (state, work) = (state(host), show_count(host.running));
     let version = if station.version.is_empty() { "an earlier version" } else { &station.version };
     let largest = station.largest.map(|largest| format!(", files up to {}", show_size(largest))).unwrap_or_default();
-    let workers = if station.roles.has(suture_store::Role::Worker) {
+    let workers = if station.roles.has(Role::Worker) {
         format!("; {} workers, {} of memory{largest}", station.workers, show_size(station.memory))
     } else {
         String::new()
     };
-    plain(&format!("{}: {state}, {}, {work} in work{workers}; {version}, process {}", host.daemon, station.roles, station.pid))
+    let keeps = keeps(host).map(|folders| format!("; looks for drops in {folders}")).unwrap_or_default();
+    plain(&format!(
+        "{}: {state}, {}, {work} in work{workers}{keeps}; {version}, process {}",
+        host.daemon, station.roles, station.pid
+    ))
 }
 
-/// Jobs of these hot folders that wait for a host that is not there, in words.
+/// The folders in which a host looks for drops, in words; `None`: in none.
+pub(crate) fn keeps(host: &Host) -> Option<String> {
+    let folders: Vec<&str> = host.folders.iter().filter(|folder| host.keeps(folder)).map(String::as_str).collect();
+    (!folders.is_empty()).then(|| folders.join(", "))
+}
+
+/// What these hot folders lack a host for, in words: nobody looks for drops there, or jobs wait for a host that is not there.
 ///
 /// # Errors
 /// Store errors only.
 pub(crate) fn stranded(store: &dyn JobStore, hosts: &[Host], folders: &[String]) -> Result<Vec<String>, StoreError> {
-    let mut words = Vec::new();
+    let mut words: Vec<String> = folders.iter().filter_map(|folder| unkept(hosts, folder)).collect();
     let waits = |above: Option<u64>| {
         let size = (above.map_or(0, |most| most.saturating_add(1)), u64::MAX);
         let of = |alone| store.waiting(&Filter { size, alone });
@@ -98,6 +109,24 @@ pub(crate) fn stranded(store: &dyn JobStore, hosts: &[Host], folders: &[String])
     Ok(words)
 }
 
+/// That nobody looks for drops in a folder, in words, if it is so.
+fn unkept(hosts: &[Host], folder: &str) -> Option<String> {
+    if hosts.iter().any(|host| host.is_alive && host.keeps(folder)) {
+        return None;
+    }
+    let could =
+        |host: &&Host| host.is_alive && host.station.roles.has(Role::Intake) && host.folders.iter().any(|name| name == folder);
+    let why = match (hosts.iter().find(|host| host.keeps(folder)), hosts.iter().find(could)) {
+        (Some(silent), Some(_)) => {
+            format!("{} did, and gives no sign of life; another host does as soon as that process is gone", silent.daemon)
+        }
+        (Some(silent), None) => format!("{} did, and gives no sign of life, and no other host could", silent.daemon),
+        (None, Some(could)) => format!("{} could, and has not begun", could.daemon),
+        (None, None) => "none with the role intake is alive".to_owned(),
+    };
+    Some(format!("no host looks for drops in the folder `{folder}`: {why}"))
+}
+
 /// The latest job of a folder that waits, of more than so many bytes.
 fn latest(store: &dyn JobStore, folder: &str, above: Option<u64>) -> Result<Option<(suture_store::JobId, u64)>, StoreError> {
     let look = Look { kinds: QUEUED.into(), folder: Some(folder.to_owned()), limit: LATEST, before: None };
@@ -117,7 +146,16 @@ mod tests {
         let roles: Roles = roles.parse().unwrap();
         Host {
             daemon: daemon.into(),
-            station: Station { roles, largest, workers: 2, memory: 1 << 30, version: "1.2.3".into(), pid: 7, host: "a".into() },
+            station: Station {
+                roles,
+                largest,
+                workers: 2,
+                memory: 1 << 30,
+                version: "1.2.3".into(),
+                pid: 7,
+                host: "a".into(),
+                keeps: vec!["hot".into()],
+            },
             folders: vec!["hot".into()],
             began: Time(1),
             seen: Time(2),
@@ -131,7 +169,8 @@ mod tests {
     #[test]
     fn what_no_host_takes_is_told() {
         let store = MemoryStore::default();
-        let told = |hosts: &[Host]| stranded(&store, hosts, &["hot".into()]).unwrap();
+        let keeper = host("k:/s", "intake", None);
+        let told = |hosts: &[Host]| stranded(&store, &[hosts, std::slice::from_ref(&keeper)].concat(), &["hot".into()]).unwrap();
         let (small, large) = (host("a:/s", "worker", Some(1000)), host("b:/s", "worker", None));
         assert_eq!(told(&[]), [""; 0], "nothing waits");
         store.submit(&[dropped("small.stl", 84).unwrap()]).unwrap();
@@ -149,6 +188,26 @@ mod tests {
         assert_eq!(told(&[small, large]), [""; 0]);
     }
 
+    /// A folder in which nobody looks for drops is told of, with who did and who could.
+    #[test]
+    fn a_folder_that_nobody_keeps_is_told() {
+        let store = MemoryStore::default();
+        let told = |hosts: &[Host]| stranded(&store, hosts, &["hot".into()]).unwrap().join("; ");
+        let keeper = host("a:/s", "intake", None);
+        let silent = Host { is_alive: false, ..keeper.clone() };
+        let visitor =
+            Host { station: Station { keeps: Vec::new(), ..keeper.station.clone() }, daemon: "b:/s".into(), ..keeper.clone() };
+        let worker = host("c:/s", "worker", None);
+        assert_eq!(told(&[keeper.clone(), visitor.clone(), worker.clone()]), "");
+        let words = "no host looks for drops in the folder `hot`: ";
+        assert_eq!(told(&[worker]), format!("{words}none with the role intake is alive"));
+        assert_eq!(told(std::slice::from_ref(&visitor)), format!("{words}b:/s could, and has not begun"));
+        assert_eq!(told(&[silent.clone()]), format!("{words}a:/s did, and gives no sign of life, and no other host could"));
+        let waits = "a:/s did, and gives no sign of life; another host does as soon as that process is gone";
+        assert_eq!(told(&[silent.clone(), visitor]), format!("{words}{waits}"));
+        assert_eq!(told(&[silent, keeper]), "", "another one does");
+    }
+
     #[test]
     fn a_host_is_a_line() {
         let told = line(&Host { is_draining: true, ..host("a:/s\u{1b}", "worker", Some(2 << 30)) });
@@ -157,6 +216,10 @@ mod tests {
             "a:/s\\u{1b}: draining, worker, 1 in work; 2 workers, 1.1 GB of memory, files up to 2.1 GB; 1.2.3, process 7"
         );
         assert!(!line(&host("a:/s", "control", None)).contains("memory"));
+        assert_eq!(
+            line(&host("a:/s", "intake", None)),
+            "a:/s: alive, intake, 1 in work; looks for drops in hot; 1.2.3, process 7"
+        );
         assert_eq!(state(&Host { is_alive: false, ..host("a", "worker", None) }), "silent");
         assert_eq!(state(&Host { is_draining: true, running: 0, ..host("a", "worker", None) }), "drained");
     }

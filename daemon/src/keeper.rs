@@ -55,6 +55,8 @@ pub(crate) struct Keeper {
     handed: Vec<Handed>,
     disk_looked: Option<Instant>,
     farm_looked: Option<Instant>,
+    /// The folders of which it told last that it looks for drops there.
+    announced: Option<Vec<String>>,
     /// When it was asked which jobs of shared folders have ended, and how long that took.
     heard: Option<Instant>,
     hearing_takes: Duration,
@@ -141,6 +143,7 @@ impl Keeper {
             handed: Vec::new(),
             disk_looked: None,
             farm_looked: None,
+            announced: None,
             heard: None,
             hearing_takes: Duration::ZERO,
             nights,

@@ -75,8 +75,8 @@ fn host_name() -> String {
     std::fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default().trim().to_owned()
 }
 
-/// What a daemon of this process tells others of itself.
-pub(crate) fn station(config: &Config) -> Station {
+/// What a daemon of this process tells others of itself; it looks for drops in the folders `keeps`.
+pub(crate) fn station(config: &Config, keeps: Vec<String>) -> Station {
     Station {
         host: host_name(),
         pid: std::process::id(),
@@ -85,6 +85,7 @@ pub(crate) fn station(config: &Config) -> Station {
         workers: u32::try_from(config.workers).unwrap_or(u32::MAX),
         memory: config.memory,
         largest: config.largest,
+        keeps,
     }
 }
 
@@ -144,7 +145,7 @@ fn connect(address: &Address, config: &Config) -> Result<Arc<dyn JobStore>, Stor
     // A folder in a bucket or on a share lies on no machine more than on another.
     let joint = config.folders.iter().filter(|folder| folder.is_for_many()).map(|folder| folder.name.clone()).collect();
     let new = Shared::new(address.exposed(), &daemon_name(&config.state));
-    Ok(Arc::new(PostgresStore::open(&Shared { folders, joint, station: station(config), ..new })?))
+    Ok(Arc::new(PostgresStore::open(&Shared { folders, joint, station: station(config, Vec::new()), ..new })?))
 }
 
 /// Opens the shared store to look at it, or to say what is to become of its jobs. `daemon`: whose jobs in work it brings along by an import.

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::id::Time;
-use crate::role::Roles;
+use crate::role::{Role, Roles};
 
 /// What a daemon tells of itself.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -23,6 +23,9 @@ pub struct Station {
     /// Bytes of the largest file that it takes; `None`: of any size.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub largest: Option<u64>,
+    /// The hot folders in which it looks for drops, by name. Of a share, one daemon does.
+    #[serde(default)]
+    pub keeps: Vec<String>,
 }
 
 /// A daemon that shares the store.
@@ -54,16 +57,20 @@ impl Host {
         self.works() && serves && self.station.largest.is_none_or(|largest| size <= largest)
     }
 
+    /// Does it look for drops in that folder?
+    pub fn keeps(&self, folder: &str) -> bool {
+        self.station.roles.has(Role::Intake) && self.station.keeps.iter().any(|name| name == folder)
+    }
+
     /// Does it claim anything at all?
     pub fn works(&self) -> bool {
-        self.is_alive && !self.is_draining && self.station.roles.has(crate::role::Role::Worker)
+        self.is_alive && !self.is_draining && self.station.roles.has(Role::Worker)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::role::Role;
 
     #[test]
     fn a_host_takes_what_it_serves_and_can_hold() {
@@ -81,6 +88,10 @@ mod tests {
         let largest = Station { largest: None, ..host.station.clone() };
         assert!(Host { station: largest, ..host.clone() }.takes("farm", u64::MAX));
         assert!(!Host { is_alive: false, ..host.clone() }.works() && !Host { is_draining: true, ..host.clone() }.works());
+        let keeper = Station { keeps: vec!["farm".into()], ..host.station.clone() };
+        assert!(!host.keeps("farm") && Host { station: keeper.clone(), ..host.clone() }.keeps("farm"));
+        let works = Station { roles: Roles::of([Role::Worker]).unwrap(), ..keeper };
+        assert!(!Host { station: works, ..host.clone() }.keeps("farm"));
         let shows = Station { roles: Roles::of([Role::Intake, Role::Control]).unwrap(), ..host.station.clone() };
         assert!(!Host { station: shows, ..host }.works());
     }

@@ -437,6 +437,10 @@ impl JobStore for PostgresStore {
 
     fn announce(&self, station: &Station) {
         station.clone_into(&mut self.life.station.lock().unwrap_or_else(PoisonError::into_inner));
+        let told = brief(|| self.ask(async |connection| hosts::see(connection, &self.life).await));
+        if let Err(error) = told {
+            tracing::debug!(%error, "What this daemon is will be told with its next sign of life.");
+        }
     }
 
     fn drain(&self, name: &str, drains: bool) -> Result<bool, StoreError> {

@@ -1,4 +1,4 @@
-//! What a farm wants of this daemon: whether it is drained, which an operator says to the store.
+//! What a farm and this daemon tell each other: an operator says to the store whether it is drained, and it says in which folders it looks for drops.
 
 use std::time::{Duration, Instant};
 
@@ -7,6 +7,7 @@ use suture_store::{Role, StoreError};
 
 use super::Keeper;
 use crate::schedule::Hold;
+use crate::shared::station;
 
 /// It is asked this often.
 const EVERY: Duration = Duration::from_secs(1);
@@ -14,6 +15,19 @@ const EVERY: Duration = Duration::from_secs(1);
 const WORDS: &str = "this host is drained; `suture hosts resume` ends that";
 
 impl Keeper {
+    /// Tells what it is and in which folders it looks for drops, unless that was told already.
+    pub(super) fn announce(&mut self) {
+        let context = &self.context;
+        let is_kept = |name: &str| self.folders.iter().any(|kept| kept.is_kept && kept.folder.name == name);
+        // Of drops in a bucket, each daemon with that role looks for all.
+        let mine = context.folders.iter().filter(|folder| folder.bucket.is_some() || is_kept(&folder.name));
+        let keeps: Vec<String> = mine.filter(|_| context.has(Role::Intake)).map(|folder| folder.name.clone()).collect();
+        if self.announced.as_ref() != Some(&keeps) {
+            context.store.announce(&station(&context.settings.now(), keeps.clone()));
+            self.announced = Some(keeps);
+        }
+    }
+
     /// Takes nothing new while this daemon is drained. The store gives it nothing either; this spares it the asking, and says so.
     pub(super) fn look_at_farm(&mut self, now: Instant) -> Result<(), StoreError> {
         let context = &self.context;

@@ -4,8 +4,8 @@ use suture_store::job::Kind;
 use suture_store::{Control, Query, Role, StoreError};
 
 use super::{Keeper, control, pace};
+use crate::deliver;
 use crate::settings::Reload;
-use crate::{deliver, shared};
 
 impl Keeper {
     /// The configuration was read anew: what of it the keeper works by, and what may go on now. Says what came of it, in one line.
@@ -24,7 +24,7 @@ impl Keeper {
                     deliver::subscribe(&self.context)?;
                 }
                 self.context.store.share(&self.context.settings.now().shares());
-                self.context.store.announce(&shared::station(&self.context.settings.now()));
+                self.announced = None;
                 // Whoever mended a setting need not wait for the next try.
                 self.hasten_waiting()?;
                 let changes = if changes.is_empty() { "none".into() } else { changes.join(", ") };

@@ -29,6 +29,8 @@ impl Keeper {
     pub(super) fn take_up(&mut self, now: Instant) -> Result<(), StoreError> {
         let context = &self.context;
         let new: Vec<bool> = self.folders.iter_mut().map(|kept| kept.begins_to_keep(context, now)).collect();
+        self.announce();
+        let context = &self.context;
         // All jobs are read for it.
         if new.contains(&true) {
             let mut new: Vec<&mut Kept> =

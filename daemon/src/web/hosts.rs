@@ -27,6 +27,8 @@ pub(super) struct Shown {
     version: String,
     roles: suture_store::Roles,
     folders: Vec<String>,
+    /// Of these, it looks for drops.
+    keeps: Vec<String>,
     running: u64,
     workers: u32,
     memory_bytes: u64,
@@ -40,6 +42,7 @@ pub(super) struct Shown {
 impl From<Host> for Shown {
     fn from(host: Host) -> Self {
         let state = hosts::state(&host);
+        let keeps = host.folders.iter().filter(|folder| host.keeps(folder)).cloned().collect();
         let Host { daemon, station, folders, began, seen, running, .. } = host;
         Self {
             daemon,
@@ -49,6 +52,7 @@ impl From<Host> for Shown {
             version: station.version,
             roles: station.roles,
             folders,
+            keeps,
             running,
             workers: station.workers,
             memory_bytes: station.memory,

@@ -16,7 +16,7 @@ use crate::role::{Role, Roles};
 const FORGOTTEN_AFTER: i64 = 24 * 3600 * 1000;
 
 const HOSTS: &str = "SELECT l.daemon, coalesce(l.host, split_part(l.daemon, ':', 1)) AS host, l.pid, l.version, l.roles, l.workers, l.memory, l.largest,
-        coalesce(l.folders, '{}') AS folders, l.began, l.seen, greatest(l.seen, suture_up_since()) + $1 > suture_now() AS is_alive,
+        coalesce(l.folders, '{}') AS folders, coalesce(l.keeps, l.folders, '{}') AS keeps, l.began, l.seen, greatest(l.seen, suture_up_since()) + $1 > suture_now() AS is_alive,
         suture_drains(l.epoch) AS is_draining, (SELECT count(*) FROM jobs j WHERE j.epoch = l.epoch) AS running
     FROM lives l WHERE NOT l.is_over AND l.seen + $2 > suture_now() ORDER BY 2, 1";
 
@@ -41,6 +41,7 @@ fn host(row: &PgRow) -> Result<Host, Failure> {
             workers: count("workers")?.and_then(|workers| u32::try_from(workers).ok()).unwrap_or_default(),
             memory: count("memory")?.unwrap_or_default(),
             largest: count("largest")?,
+            keeps: row.try_get("keeps")?,
         },
         folders: row.try_get("folders")?,
         began: Time(number(row.try_get("began")?)),
@@ -54,7 +55,7 @@ fn host(row: &PgRow) -> Result<Host, Failure> {
 /// The daemon lives, and is this.
 pub(super) async fn see(connection: &mut PgConnection, life: &Life) -> Result<(), Failure> {
     let station = life.station.lock().unwrap_or_else(PoisonError::into_inner).clone();
-    let seen = "UPDATE lives SET seen = suture_now(), host = $2, pid = $3, version = $4, roles = $5, workers = $6, memory = $7, largest = $8
+    let seen = "UPDATE lives SET seen = suture_now(), host = $2, pid = $3, version = $4, roles = $5, workers = $6, memory = $7, largest = $8, keeps = $9
         WHERE epoch = $1 AND NOT is_over";
     sqlx::query(seen)
         .bind(int(life.epoch.0))
@@ -65,6 +66,7 @@ pub(super) async fn see(connection: &mut PgConnection, life: &Life) -> Result<()
         .bind(i64::from(station.workers))
         .bind(int(station.memory))
         .bind(station.largest.map(int))
+        .bind(&station.keeps)
         .execute(connection)
         .await?;
     Ok(())

@@ -11,8 +11,12 @@ use super::outbox::LOCKS;
 use crate::store::StoreError;
 
 /// Each with its number, from 1 on. What is written here never changes: a database remembers the digest.
-const MIGRATIONS: [&str; 3] =
-    [include_str!("sql/schema_1.sql"), include_str!("sql/schema_2.sql"), include_str!("sql/schema_3.sql")];
+const MIGRATIONS: [&str; 4] = [
+    include_str!("sql/schema_1.sql"),
+    include_str!("sql/schema_2.sql"),
+    include_str!("sql/schema_3.sql"),
+    include_str!("sql/schema_4.sql"),
+];
 
 pub(super) fn digest(migration: &str) -> Vec<u8> {
     Sha256::digest(migration).to_vec()

@@ -64,6 +64,13 @@ fn assert_done(place: &Place, count: u64) {
     }
 }
 
+/// The hosts that look for drops in the share, as the store has them.
+fn keepers(place: &Place, url: &str) -> Vec<String> {
+    let said = place.suture(["hosts", "list", "--store", url]).expect(0).stdout();
+    let keeps = said.lines().filter(|line| line.contains(": alive, ") && line.contains("; looks for drops in prints;"));
+    keeps.filter_map(|line| Some(line.split(": alive").next()?.rsplit('/').next()?.to_owned())).collect()
+}
+
 /// The words of a daemon that does not begin.
 fn refused(place: &Place, host: &str, words: &[&str], exit: i32) -> String {
     let mut arguments = vec!["watch".to_owned(), "--config".into(), format!("{host}.toml")];
@@ -112,7 +119,10 @@ fn daemons_of_several_machines_share_a_folder_whoever_keeps_it() {
     wait_for(&place, &url, 12);
     assert!(!keeps(&two) && !keeps(&works));
     assert_eq!(jobs(&place, "share").len(), 12, "the daemon that keeps it answers");
+    assert_eq!(keepers(&place, &url), ["one"]);
     let client = Client::of(&two);
+    let page = String::from_utf8_lossy(&client.get("/").body).into_owned();
+    assert_eq!(page.matches("<td>prints</td>").count(), 1, "{page}");
     let said = client.send("POST", "/v1/jobs?name=x.stl", &[], &holes(1));
     assert!(said.status == 503 && String::from_utf8_lossy(&said.body).contains("another daemon looks for drops"), "{said:?}");
 
@@ -131,6 +141,7 @@ fn daemons_of_several_machines_share_a_folder_whoever_keeps_it() {
     one.signal(Signal::TERM);
     assert!(one.ended().success());
     wait_until("the second keeps it", || keeps(&two));
+    wait_until("that is told", || keepers(&place, &url) == ["two"]);
     drop_files(&place, 13..=16);
     wait_for(&place, &url, 16);
     // Not its end: a kill. Its lock goes with it.
@@ -140,7 +151,12 @@ fn daemons_of_several_machines_share_a_folder_whoever_keeps_it() {
     drop_files(&place, 17..=20);
     wait_for(&place, &url, 20);
     assert_done(&place, 20);
-    drop((one, works));
+    one.signal(Signal::TERM);
+    assert!(one.ended().success());
+    let status = || place.suture(["status", "--store", &url]).expect(0).stdout();
+    let nobody = "no host looks for drops in the folder `prints`";
+    wait_until("that nobody keeps it is told", || status().contains(nobody));
+    drop(works);
     let said = place.suture(["jobs", "list", "--dir", "share"]).expect(2).stderr();
     assert!(said.contains("the jobs are in postgres://") && said.contains("add --store"), "{said}");
     assert!(place.suture(["watch", "share", "--once"]).expect(75).stderr().contains("its jobs are in postgres://"));

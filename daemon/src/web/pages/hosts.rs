@@ -13,7 +13,7 @@ use suture_store::{Host, Role};
 
 use super::actions::{check_word, form, see};
 use super::frame::Frame;
-use crate::hosts::state;
+use crate::hosts::{keeps, state};
 use crate::html::words::time;
 use crate::say::plain;
 use crate::units::{show_count, show_size};
@@ -28,7 +28,7 @@ pub(super) fn table(hosts: &[Host], is_shared: bool, frame: &Frame) -> Markup {
         h2 { "Hosts" }
         div class="wide" { table {
             thead { tr {
-                th scope="col" { "Host" } th scope="col" { "Does" } th scope="col" { "State" } th scope="col" class="n" { "In work" } th scope="col" class="n" { "Workers" }
+                th scope="col" { "Host" } th scope="col" { "Does" } th scope="col" { "Looks for drops in" } th scope="col" { "State" } th scope="col" class="n" { "In work" } th scope="col" class="n" { "Workers" }
                 th scope="col" class="n" { "Memory" } th scope="col" class="n" { "Files up to" } th scope="col" { "Suture" } th scope="col" { "Last sign" } @if is_shared { th scope="col" { "" } }
             } }
             tbody { @for host in hosts { (row(host, is_shared, frame)) } }
@@ -46,6 +46,7 @@ fn row(host: &Host, is_shared: bool, frame: &Frame) -> Markup {
     html! { tr {
         th scope="row" { (plain(&station.host)) br; span class="soft" { (plain(&host.daemon)) } }
         td { (station.roles) }
+        td { (keeps(host).map_or_else(|| "–".to_owned(), |folders| plain(&folders))) }
         td { span class=(class) { (state(host)) } }
         td class="n" { (show_count(host.running)) }
         td class="n" { @if works { (station.workers) } @else { "–" } }

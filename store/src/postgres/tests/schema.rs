@@ -21,7 +21,7 @@ fn eight_that_begin_at_once_make_one_schema() {
     for store in opened {
         store.unwrap().check().unwrap();
     }
-    sql(&shared, "DO $$ BEGIN ASSERT (SELECT count(*) FROM migrations) = 3 AND (SELECT count(*) FROM lives) = 8; END $$")
+    sql(&shared, "DO $$ BEGIN ASSERT (SELECT count(*) FROM migrations) = 4 AND (SELECT count(*) FROM lives) = 8; END $$")
         .unwrap();
 }
 
@@ -30,11 +30,11 @@ fn a_newer_schema_is_refused_and_so_is_one_of_another_make() {
     let Some(server) = server() else { return };
     let shared = server.schema("daemon");
     drop(PostgresStore::open(&shared).unwrap());
-    sql(&shared, "INSERT INTO migrations (version, digest) VALUES (4, ''), (5, '')").unwrap();
+    sql(&shared, "INSERT INTO migrations (version, digest) VALUES (5, ''), (6, '')").unwrap();
     let error = PostgresStore::open(&shared).err().unwrap();
-    assert!(matches!(error, StoreError::Newer { found: 5, known: 3 }), "{error:?}");
-    assert_eq!(error.to_string(), "the job database has version 5; this program knows versions up to 3");
-    sql(&shared, "DELETE FROM migrations WHERE version > 3; UPDATE migrations SET digest = 'x'").unwrap();
+    assert!(matches!(error, StoreError::Newer { found: 6, known: 4 }), "{error:?}");
+    assert_eq!(error.to_string(), "the job database has version 6; this program knows versions up to 4");
+    sql(&shared, "DELETE FROM migrations WHERE version > 4; UPDATE migrations SET digest = 'x'").unwrap();
     let error = PostgresStore::open(&shared).err().unwrap();
     assert!(matches!(error, StoreError::Unusable { .. }) && error.to_string().contains("its version 1"), "{error}");
 }
@@ -134,6 +134,7 @@ fn a_store_of_version_1_is_brought_up_to_date_beside_a_daemon_of_its_own() {
     let store = PostgresStore::open(&shared).unwrap();
     let old = store.hosts().unwrap().into_iter().find(|host| host.daemon == "old:/state").unwrap();
     assert_eq!((old.station.host.as_str(), old.station.roles.are_all(), old.is_alive), ("old", true, true));
+    assert!(old.keeps("a"), "it looks for drops, and tells nothing of that");
     // It serves its folder alone, as it did.
     let beside = Shared { folders: Some(vec!["a".into()]), joint: ["a".to_owned()].into(), ..other(&shared, "new") };
     assert!(matches!(PostgresStore::open(&beside), Err(StoreError::Served { .. })));

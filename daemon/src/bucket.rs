@@ -12,7 +12,7 @@ use std::sync::Arc;
 use bytes::Bytes;
 use object_store::multipart::PartId;
 use object_store::path::Path as Key;
-use object_store::{Attributes, GetOptions, GetRange, ObjectStore, PutMode, PutOptions, PutPayload};
+use object_store::{Attributes, GetOptions, GetRange, GetResult, ObjectStore, PutMode, PutOptions, PutPayload};
 use suture_store::Hash;
 
 use crate::{create, fsx};
@@ -131,8 +131,7 @@ impl Bucket {
     /// # Errors
     /// When the store does not answer.
     pub(crate) fn stat(&self, below: &str) -> Result<Option<Object>, Trouble> {
-        let key = self.key(below)?;
-        match self.caller.call(|| self.store.get_opts(&key, GetOptions { head: true, ..GetOptions::default() })) {
+        match self.head(&self.key(below)?, GetOptions::default()) {
             Ok(found) => {
                 let owner = found.attributes.get(&OWNER).map(|owner| owner.to_string());
                 Ok(Some(Object { version: Version::of(&found.meta), owner }))
@@ -140,6 +139,10 @@ impl Bucket {
             Err(Failed::Absent) => Ok(None),
             Err(other) => Err(other.or_changed()),
         }
+    }
+
+    fn head(&self, key: &Key, options: GetOptions) -> Result<GetResult, Failed> {
+        self.caller.call(|| self.store.get_opts(key, GetOptions { head: true, ..options.clone() }))
     }
 
     /// Reads that version, range by range.
@@ -212,7 +215,7 @@ impl Bucket {
             file.read_to_end(&mut bytes)?;
             return self.put_bytes_new(bytes, below, owner, gate);
         }
-        self.in_parts(below, owner, gate, (size, self.part), &mut |to, n, range| {
+        self.in_parts(below, &by(owner), gate, (size, self.part), &mut |to, n, range| {
             let mut bytes = Vec::new();
             (&mut file).take(range.end - range.start).read_to_end(&mut bytes)?;
             let bytes = Bytes::from(bytes);
@@ -225,32 +228,46 @@ impl Bucket {
     /// # Errors
     /// As [`Bucket::put_new`].
     pub(crate) fn put_bytes_new(&self, bytes: impl Into<Bytes>, below: &str, owner: &str, gate: Gate) -> Result<Put, Trouble> {
-        let (key, payload) = (self.key(below)?, PutPayload::from(bytes.into()));
-        let attributes = Attributes::from_iter([(OWNER, owner.to_owned())]);
+        self.put_whole_new(bytes.into(), below, &by(owner), gate)
+    }
+
+    fn put_whole_new(&self, bytes: Bytes, below: &str, attributes: &Attributes, gate: Gate) -> Result<Put, Trouble> {
+        let (key, payload) = (self.key(below)?, PutPayload::from(bytes));
         let options = || PutOptions { mode: PutMode::Create, attributes: attributes.clone(), ..PutOptions::default() };
         self.written(self.caller.call_at(gate, || self.store.put_opts(&key, payload.clone(), options())).map(drop))
     }
 
-    /// Copies that version of an object, within the store, to a name that nothing has.
+    /// Copies that version of an object, within the store, to a name that nothing has. It keeps what whoever put it said of it: its type, and words of
+    /// their own.
     ///
     /// # Errors
     /// When the store does not answer, or the object is another one by now. Then the copy may be there all the same.
     pub(crate) fn copy_new(&self, from: (&str, &Version), to: &str, owner: &str, gate: Gate) -> Result<Put, Trouble> {
         let (source, version) = (self.key(from.0)?, from.1);
+        let as_it_was = GetOptions { if_match: version.etag.clone(), version: version.id.clone(), ..GetOptions::default() };
+        let mut attributes = self.head(&source, as_it_was).map_err(Failed::or_changed)?.attributes;
+        attributes.insert(OWNER, owner.to_owned().into());
         if version.size == 0 {
             // No part is empty.
-            return self.put_bytes_new(Vec::new(), to, owner, gate);
+            return self.put_whole_new(Bytes::new(), to, &attributes, gate);
         }
         let part = self.part.saturating_mul(COPIED_AT_ONCE);
-        self.in_parts(to, owner, gate, (version.size, part), &mut |to, n, range| {
+        self.in_parts(to, &attributes, gate, (version.size, part), &mut |to, n, range| {
             self.caller.call(|| self.requests.copy_part(to, n, (&source, version), range.clone()))
         })
     }
 
     /// Writes an object of that size in parts. Nobody sees it before the last step, which has the condition.
-    fn in_parts(&self, below: &str, owner: &str, gate: Gate, (size, part): (u64, u64), send: Send) -> Result<Put, Trouble> {
+    fn in_parts(
+        &self,
+        below: &str,
+        attributes: &Attributes,
+        gate: Gate,
+        (size, part): (u64, u64),
+        send: Send,
+    ) -> Result<Put, Trouble> {
         let (key, part) = (self.key(below)?, part.max(size.div_ceil(MOST_PARTS)));
-        let id = self.caller.call(|| self.requests.begin(&key, owner)).map_err(|failed| self.caller.gone(failed))?;
+        let id = self.caller.call(|| self.requests.begin(&key, attributes)).map_err(|failed| self.caller.gone(failed))?;
         let upload = Upload { key, id };
         let mut write = || {
             let (mut parts, mut from) = (Vec::new(), 0);
@@ -327,6 +344,11 @@ impl Bucket {
             Err(Failed::Trouble(trouble)) => Err(trouble),
         }
     }
+}
+
+/// The attributes of an object of that owner.
+fn by(owner: &str) -> Attributes {
+    Attributes::from_iter([(OWNER, owner.to_owned())])
 }
 
 /// An answer that is shorter than what was asked for.

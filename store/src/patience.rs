@@ -33,8 +33,7 @@ pub fn hurry_when(is_so: impl Fn() -> bool + Send + Sync + 'static) {
 }
 
 /// Is the process to end?
-#[cfg(feature = "postgres")]
-pub(crate) fn is_hurried() -> bool {
+pub fn is_hurried() -> bool {
     HURRY.get().is_some_and(|is_so| is_so())
 }
 

@@ -2,11 +2,13 @@
 //! answer is never taken for one: nothing is known then.
 
 use std::future::Future;
+use std::pin::pin;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use object_store::Error;
+use suture_store::patience::is_hurried;
 use tokio::runtime::{Builder, Runtime};
 
 use super::address::BucketAddress;
@@ -17,6 +19,10 @@ use super::weather::Weather;
 pub(super) const CALL: Duration = Duration::from_secs(60);
 /// So often a call is made before it counts as an outage, with a pause between that doubles.
 const TRIES: u32 = 4;
+/// A call on its way takes no longer once the daemon is to end, and none is made again.
+const LAST: Duration = if cfg!(test) { Duration::from_millis(200) } else { Duration::from_secs(10) };
+/// How often it is looked whether the daemon is to end.
+const TICK: Duration = Duration::from_millis(50);
 /// The same before the daemon has begun, which waits for them.
 const FIRST: (Duration, u32) = (Duration::from_secs(10), 1);
 const FIRST_PAUSE: Duration = if cfg!(test) { Duration::from_micros(100) } else { Duration::from_millis(100) };
@@ -44,6 +50,22 @@ impl Failed {
 impl<E: Into<Trouble>> From<E> for Failed {
     fn from(error: E) -> Self {
         Self::Trouble(error.into())
+    }
+}
+
+/// The answer to a call, or for how long it was waited for in vain.
+async fn within<T>(call: impl Future<Output = T>, limit: Duration, is_hurried: &impl Fn() -> bool) -> Result<T, Duration> {
+    let mut call = pin!(call);
+    let (mut waited, mut hurried) = (Duration::ZERO, Duration::ZERO);
+    loop {
+        if let Ok(answer) = tokio::time::timeout(TICK, call.as_mut()).await {
+            return Ok(answer);
+        }
+        waited += TICK;
+        hurried += if is_hurried() { TICK } else { Duration::ZERO };
+        if waited >= limit || hurried >= LAST {
+            return Err(waited);
+        }
     }
 }
 
@@ -105,8 +127,8 @@ impl Caller {
         let (mut pause, mut n) = (FIRST_PAUSE, 1);
         loop {
             gate()?;
-            let reason = match self.runtime.block_on(async { tokio::time::timeout(limit, make()).await }) {
-                Err(_) => format!("no answer within {} s", limit.as_secs()),
+            let reason = match self.runtime.block_on(async { within(make(), limit, &is_hurried).await }) {
+                Err(waited) => format!("no answer within {:.0} s", waited.as_secs_f64()),
                 Ok(Ok(answer)) => {
                     self.weather.fair();
                     return Ok(answer);
@@ -130,7 +152,7 @@ impl Caller {
                     Meaning::Nothing => one_line(&error),
                 },
             };
-            if n >= tries {
+            if n >= tries || is_hurried() {
                 return Err(Trouble::Away(self.foul(&format!("the object store does not serve us: {reason}"))).into());
             }
             // The pauses of many who wait for the same store are to differ.
@@ -198,6 +220,22 @@ fn random() -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// A call that nobody answers ends by its limit, or soon after the daemon is to end; one that is answered is not cut.
+    #[test]
+    fn a_call_waits_less_once_the_daemon_is_to_end() {
+        let runtime = Builder::new_current_thread().enable_time().build().unwrap();
+        let ended = |limit, is_hurried: &dyn Fn() -> bool| {
+            runtime.block_on(async { within(std::future::pending::<()>(), limit, &is_hurried).await.unwrap_err() })
+        };
+        assert_eq!(ended(2 * TICK, &|| false), 2 * TICK);
+        assert_eq!(ended(CALL, &|| true), LAST);
+        let answer = async {
+            tokio::time::sleep(3 * TICK).await;
+            7
+        };
+        assert_eq!(runtime.block_on(async { within(answer, CALL, &|| true).await }), Ok(7));
+    }
 
     #[test]
     fn nothing_of_who_asked_is_said() {

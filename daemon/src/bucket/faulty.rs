@@ -14,7 +14,7 @@ use object_store::multipart::PartId;
 use object_store::path::Path as Key;
 use object_store::*;
 
-use super::object::{OWNER, Version};
+use super::object::Version;
 use super::requests::{Listed, Page, Requests, Upload};
 
 /// The store.
@@ -37,7 +37,7 @@ struct State {
     /// The last listing said this.
     listed: Vec<Listed>,
     /// Who writes, and parts by number.
-    uploads: BTreeMap<String, (String, BTreeMap<usize, Bytes>)>,
+    uploads: BTreeMap<String, (Attributes, BTreeMap<usize, Bytes>)>,
     /// Uploads so far.
     begun: u32,
 }
@@ -197,12 +197,12 @@ impl Requests for Faulty {
         .await
     }
 
-    async fn begin(&self, _: &Key, owner: &str) -> Result<MultipartId> {
+    async fn begin(&self, _: &Key, attributes: &Attributes) -> Result<MultipartId> {
         self.told(async {
             let mut state = self.state.lock().unwrap();
             state.begun += 1;
             let id = state.begun.to_string();
-            state.uploads.insert(id.clone(), (owner.into(), BTreeMap::new()));
+            state.uploads.insert(id.clone(), (attributes.clone(), BTreeMap::new()));
             Ok(id)
         })
         .await
@@ -224,12 +224,11 @@ impl Requests for Faulty {
 
     async fn complete_new(&self, upload: &Upload, parts: &[PartId]) -> Result<()> {
         self.told(async {
-            let Some((owner, sent)) = self.state.lock().unwrap().uploads.get(&upload.id).cloned() else {
+            let Some((attributes, sent)) = self.state.lock().unwrap().uploads.get(&upload.id).cloned() else {
                 return Err(Error::NotFound { path: upload.key.to_string(), source: "no such upload".into() });
             };
             assert_eq!(sent.len(), parts.len());
             let mode = if self.is_careless { PutMode::Overwrite } else { PutMode::Create };
-            let attributes = Attributes::from_iter([(OWNER, owner)]);
             let options = PutOptions { mode, attributes, ..PutOptions::default() };
             self.inner.put_opts(&upload.key, sent.into_values().collect(), options).await?;
             self.state.lock().unwrap().uploads.remove(&upload.id);

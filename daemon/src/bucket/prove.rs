@@ -4,7 +4,7 @@ use std::sync::atomic::Ordering;
 
 use super::calls::Failed;
 use super::requests::Upload;
-use super::{Bucket, Put, Trouble, Version};
+use super::{Bucket, Put, Trouble, Version, by};
 
 const OWNER: &str = "probe";
 /// How names of probes begin, below the prefix. One whose daemon died before it was removed goes with other litter.
@@ -65,8 +65,8 @@ impl Bucket {
 
     /// Is an upload in parts to a name that is taken refused at its last step?
     fn is_completion_refused(&self, probe: &str) -> Result<bool, Trouble> {
-        let key = self.key(probe)?;
-        let id = self.caller.call(|| self.requests.begin(&key, OWNER)).map_err(Failed::or_changed)?;
+        let (key, attributes) = (self.key(probe)?, by(OWNER));
+        let id = self.caller.call(|| self.requests.begin(&key, &attributes)).map_err(Failed::or_changed)?;
         let upload = Upload { key, id };
         let completed = self
             .caller

@@ -7,7 +7,7 @@ use std::ops::Range;
 use bytes::Bytes;
 use object_store::multipart::PartId;
 use object_store::path::Path as Key;
-use object_store::{MultipartId, Result};
+use object_store::{Attributes, MultipartId, Result};
 
 use super::object::Version;
 
@@ -26,11 +26,11 @@ pub(crate) trait Requests: fmt::Debug + Send + Sync {
     /// `Precondition` when it is another one.
     async fn delete(&self, key: &Key, version: &Version) -> Result<()>;
 
-    /// Begins an object that is written in parts. `owner`: who writes it.
+    /// Begins an object that is written in parts and has these attributes.
     ///
     /// # Errors
     /// The store's own errors.
-    async fn begin(&self, key: &Key, owner: &str) -> Result<MultipartId>;
+    async fn begin(&self, key: &Key, attributes: &Attributes) -> Result<MultipartId>;
 
     /// Sends a part; `n` counts from 0. Sent again, it takes the place of what was sent before.
     ///

@@ -4,23 +4,26 @@ use std::fmt::Write as _;
 use std::ops::Range;
 use std::time::Duration;
 
-use bytes::Bytes;
+use bytes::{Bytes, BytesMut};
+use futures_util::StreamExt;
 use hyper::header::{HeaderName, HeaderValue, IF_MATCH, IF_NONE_MATCH};
 use hyper::{Method, Request, StatusCode};
 use object_store::aws::AmazonS3;
-use object_store::client::HttpClient;
+use object_store::client::{HttpClient, HttpResponseBody};
 use object_store::multipart::{MultipartStore, PartId};
 use object_store::path::Path as Key;
 use object_store::signer::{SignedUrlOptions, Signer};
 use object_store::{Attributes, Error, MultipartId, PutMultipartOptions, Result};
 
 use super::listing;
-use super::object::{OWNER, Version};
+use super::object::Version;
 use super::requests::{Page, Requests, Upload};
 use crate::escape::escaped;
 
 /// An address with a signature serves no longer.
 const SIGNED_FOR: Duration = Duration::from_secs(300);
+/// No answer to a question is longer: a page of a listing names a thousand keys, of a kilobyte each, and says a little more of each.
+const MOST_SAID: usize = 16 << 20;
 /// The version of what was put while a bucket kept none: the next object of the name takes its place.
 const NO_VERSION: &str = "null";
 
@@ -53,7 +56,7 @@ impl S3 {
         let request = request.uri(url.as_str()).body(body.into()).map_err(generic)?;
         let answer = self.client.execute(request).await.map_err(generic)?;
         let status = answer.status();
-        let body = answer.into_body().bytes().await.map_err(generic)?;
+        let body = whole(answer.into_body()).await?;
         match status {
             // The last step of an upload, and a copy, may fail after the server has said that all is well.
             _ if status.is_success() && !listing::is_error(&body) => Ok(body),
@@ -81,9 +84,9 @@ impl Requests for S3 {
         self.ask(Method::DELETE, key, &query, &headers, String::new()).await.map(drop)
     }
 
-    async fn begin(&self, key: &Key, owner: &str) -> Result<MultipartId> {
-        let attributes = Attributes::from_iter([(OWNER, owner.to_owned())]);
-        self.store.create_multipart_opts(key, PutMultipartOptions { attributes, ..PutMultipartOptions::default() }).await
+    async fn begin(&self, key: &Key, attributes: &Attributes) -> Result<MultipartId> {
+        let options = PutMultipartOptions { attributes: attributes.clone(), ..PutMultipartOptions::default() };
+        self.store.create_multipart_opts(key, options).await
     }
 
     async fn put_part(&self, to: &Upload, n: usize, bytes: Bytes) -> Result<PartId> {
@@ -124,6 +127,19 @@ impl Requests for S3 {
     }
 }
 
+/// All bytes of an answer to a question: a page of a listing, or a few words.
+async fn whole(body: HttpResponseBody) -> Result<Bytes> {
+    let (mut stream, mut all) = (body.bytes_stream(), BytesMut::new());
+    while let Some(some) = stream.next().await {
+        let some = some.map_err(generic)?;
+        if all.len() + some.len() > MOST_SAID {
+            return Err(generic(format!("an answer of more than {MOST_SAID} bytes")));
+        }
+        all.extend_from_slice(&some);
+    }
+    Ok(all.freeze())
+}
+
 fn generic(source: impl Into<Box<dyn std::error::Error + Send + Sync>>) -> Error {
     Error::Generic { store: "S3", source: source.into() }
 }
@@ -150,6 +166,8 @@ fn encoded(key: &str) -> String {
 
 #[cfg(test)]
 mod tests {
+    use object_store::client::HttpResponse;
+
     use super::*;
 
     #[test]
@@ -162,6 +180,16 @@ mod tests {
         assert!(matches!(late, Error::Precondition { .. }), "{late}");
         assert!(matches!(of(StatusCode::OK, "<Error><Code>InternalError</Code></Error>"), Error::Generic { .. }));
         assert!(matches!(of(StatusCode::CONFLICT, ""), Error::Generic { .. }), "it is tried again");
+    }
+
+    #[test]
+    fn an_answer_without_end_is_no_answer() {
+        let said = |bytes: usize| {
+            let runtime = tokio::runtime::Builder::new_current_thread().build().unwrap();
+            runtime.block_on(whole(HttpResponse::new(HttpResponseBody::from(vec![b' '; bytes])).into_body()))
+        };
+        assert_eq!(said(MOST_SAID).unwrap().len(), MOST_SAID);
+        assert!(said(MOST_SAID + 1).unwrap_err().to_string().contains("an answer of more than"));
     }
 
     #[test]

@@ -1,5 +1,6 @@
 use std::sync::Arc;
 
+use object_store::Attribute;
 use object_store::memory::InMemory;
 
 use super::address::BucketAddress;
@@ -52,6 +53,29 @@ fn a_name_is_written_once_whole_in_parts_and_through_faults() {
         assert_eq!(sound.copy_new(("out/a.stl", &there.version), "out/a.stl", "8-1", ANYWAY).unwrap(), Put::There);
         assert_eq!(sound.stat("out/a.stl").unwrap().unwrap(), there, "nothing is replaced");
         assert_eq!(keys(&sound, "out"), ["a.stl"]);
+    }
+}
+
+/// The type and the words that a customer's program gave to a file are those of its copy, which has its own owner besides.
+#[test]
+fn a_copy_keeps_what_was_said_of_the_original() {
+    let inner = Arc::new(InMemory::new());
+    let words = Attribute::Metadata("order".into());
+    for (seed, bytes) in (0..20).flat_map(|seed| [(seed, &b"0123456789"[..]), (seed, b"")]) {
+        let said = [(Attribute::ContentType, "model/stl"), (words.clone(), "123"), (OWNER, "somebody's")];
+        let options = PutOptions { attributes: Attributes::from_iter(said), ..PutOptions::default() };
+        let runtime = tokio::runtime::Builder::new_current_thread().build().unwrap();
+        runtime.block_on(inner.put_opts(&"farm/in/a.stl".into(), bytes.to_vec().into(), options)).unwrap();
+        let sound = bucket(&inner, 0, 0, None, 4);
+        let there = sound.stat("in/a.stl").unwrap().unwrap().version;
+        let (to, faulty) = (format!("done/{seed} {}.stl", bytes.len()), bucket(&inner, seed, 40, None, 4));
+        (0..50).find_map(|_| faulty.copy_new(("in/a.stl", &there), &to, "7-9", ANYWAY).ok()).unwrap();
+        let copy = sound.head(&sound.key(&to).unwrap(), GetOptions::default()).unwrap();
+        let of = |attribute: &Attribute| copy.attributes.get(attribute).map(|value| value.to_string());
+        assert_eq!(
+            [&Attribute::ContentType, &words, &OWNER].map(of),
+            ["model/stl", "123", "7-9"].map(|word| Some(word.to_owned()))
+        );
     }
 }
 

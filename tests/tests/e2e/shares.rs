@@ -111,17 +111,21 @@ fn daemons_of_several_machines_share_a_folder_whoever_keeps_it() {
     let looks = ["--role", "intake,control"];
     // As of an upload to a daemon that died.
     place.put("share/.suture/upload/left.part", b"solid");
+    let works = start(&place, "works", &["--role", "worker"]);
+    let status = || place.suture(["status", "--store", &url]).expect(0).stdout();
+    let nobody = "no host looks for drops in the folder `prints`: none with the role intake is alive";
+    wait_until("that nobody keeps it is told", || status().contains(nobody));
     let one = start(&place, "one", &looks);
-    wait_until("the first keeps it", || keeps(&one));
+    wait_until("the first keeps it", || keeps(&one) && !status().contains(nobody));
     assert!(!place.at("share/.suture/upload/left.part").exists());
-    let (two, works) = (start(&place, "two", &looks), start(&place, "works", &["--role", "worker"]));
+    let two = start(&place, "two", &looks);
     drop_files(&place, 1..=12);
     wait_for(&place, &url, 12);
     assert!(!keeps(&two) && !keeps(&works));
     assert_eq!(jobs(&place, "share").len(), 12, "the daemon that keeps it answers");
     assert_eq!(keepers(&place, &url), ["one"]);
     let client = Client::of(&two);
-    let page = String::from_utf8_lossy(&client.get("/").body).into_owned();
+    let page = String::from_utf8_lossy(&client.browse("/").body).into_owned();
     assert_eq!(page.matches("<td>prints</td>").count(), 1, "{page}");
     let said = client.send("POST", "/v1/jobs?name=x.stl", &[], &holes(1));
     assert!(said.status == 503 && String::from_utf8_lossy(&said.body).contains("another daemon looks for drops"), "{said:?}");
@@ -151,12 +155,7 @@ fn daemons_of_several_machines_share_a_folder_whoever_keeps_it() {
     drop_files(&place, 17..=20);
     wait_for(&place, &url, 20);
     assert_done(&place, 20);
-    one.signal(Signal::TERM);
-    assert!(one.ended().success());
-    let status = || place.suture(["status", "--store", &url]).expect(0).stdout();
-    let nobody = "no host looks for drops in the folder `prints`";
-    wait_until("that nobody keeps it is told", || status().contains(nobody));
-    drop(works);
+    drop((one, works));
     let said = place.suture(["jobs", "list", "--dir", "share"]).expect(2).stderr();
     assert!(said.contains("the jobs are in postgres://") && said.contains("add --store"), "{said}");
     assert!(place.suture(["watch", "share", "--once"]).expect(75).stderr().contains("its jobs are in postgres://"));

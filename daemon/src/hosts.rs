@@ -202,7 +202,10 @@ mod tests {
         let words = "no host looks for drops in the folder `hot`: ";
         assert_eq!(told(&[worker]), format!("{words}none with the role intake is alive"));
         assert_eq!(told(std::slice::from_ref(&visitor)), format!("{words}b:/s could, and has not begun"));
-        assert_eq!(told(&[silent.clone()]), format!("{words}a:/s did, and gives no sign of life, and no other host could"));
+        assert_eq!(
+            told(std::slice::from_ref(&silent)),
+            format!("{words}a:/s did, and gives no sign of life, and no other host could")
+        );
         let waits = "a:/s did, and gives no sign of life; another host does as soon as that process is gone";
         assert_eq!(told(&[silent.clone(), visitor]), format!("{words}{waits}"));
         assert_eq!(told(&[silent, keeper]), "", "another one does");

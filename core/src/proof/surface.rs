@@ -174,28 +174,31 @@ fn shares_of_nearest([a, b, c]: &[DVec3; 3], p: DVec3) -> [f64; 3] {
         return inner.map(|x| x * share);
     }
     let (from_b, from_c) = (b_c - b_b, c_b - c_c);
-    let (sides, t) = if inner[2] <= 0.0 && a_b >= 0.0 && b_b <= 0.0 {
-        ([0, 1], a_b / (a_b - b_b))
+    let side = if inner[2] <= 0.0 && a_b >= 0.0 && b_b <= 0.0 {
+        Some(([0, 1], a_b / (a_b - b_b)))
     } else if inner[1] <= 0.0 && a_c >= 0.0 && c_c <= 0.0 {
-        ([0, 2], a_c / (a_c - c_c))
+        Some(([0, 2], a_c / (a_c - c_c)))
     } else if inner[0] <= 0.0 && from_b >= 0.0 && from_c >= 0.0 {
-        ([1, 2], from_b / (from_b + from_c))
+        Some(([1, 2], from_b / (from_b + from_c)))
     } else {
-        ([0, 1], f64::NAN)
+        None
     };
+    // A triangle without an area, or nearly, may have no such region.
+    let ([from, to], t) = side.filter(|(_, t)| (0.0..=1.0).contains(t)).unwrap_or_else(|| nearest_side([a, b, c], p));
     let mut shares = [0.0; 3];
-    if t >= 0.0 && t <= 1.0 {
-        (shares[sides[0]], shares[sides[1]]) = (1.0 - t, t);
-        return shares;
-    }
-    // A triangle without an area, or nearly.
-    let sides = [(a, b, [0, 1]), (b, c, [1, 2]), (c, a, [2, 0])].map(|(u, v, sides)| {
-        let t = share_along(p, *u, *v);
-        ((p - *u - (*v - *u) * t).length_squared(), t, sides)
-    });
-    let best = sides[1..].iter().fold(sides[0], |best, other| if other.0 < best.0 { *other } else { best });
-    (shares[best.2[0]], shares[best.2[1]]) = (1.0 - best.1, best.1);
+    (shares[from], shares[to]) = (1.0 - t, t);
     shares
+}
+
+/// The side of a triangle that is nearest to a place, by its corners, and the share of it where that is.
+#[cold]
+fn nearest_side(corners: [&DVec3; 3], p: DVec3) -> ([usize; 2], f64) {
+    let sides = [[0, 1], [1, 2], [2, 0]].map(|side: [usize; 2]| {
+        let [u, v] = side.map(|k| *corners[k]);
+        let t = share_along(p, u, v);
+        (p.distance_squared(u + (v - u) * t), (side, t))
+    });
+    sides[1..].iter().fold(sides[0], |best, other| if other.0 < best.0 { *other } else { best }).1
 }
 
 #[cfg(test)]

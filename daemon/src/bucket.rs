@@ -141,6 +141,7 @@ impl Bucket {
         }
     }
 
+    /// The facts of an object, and what was said of it.
     fn head(&self, key: &Key, options: GetOptions) -> Result<GetResult, Failed> {
         self.caller.call(|| self.store.get_opts(key, GetOptions { head: true, ..options.clone() }))
     }

@@ -72,11 +72,11 @@ pub(crate) fn line(host: &Host) -> String {
 
 /// The folders in which a host looks for drops, in words; `None`: in none.
 pub(crate) fn keeps(host: &Host) -> Option<String> {
-    let folders: Vec<&str> = host.folders.iter().filter(|folder| host.keeps(folder)).map(String::as_str).collect();
+    let folders: Vec<&str> = host.kept().collect();
     (!folders.is_empty()).then(|| folders.join(", "))
 }
 
-/// What these hot folders lack a host for, in words: nobody looks for drops there, or jobs wait for a host that is not there.
+/// These hot folders lack a host, in words: nobody looks for drops there, or jobs wait for a host that is not there.
 ///
 /// # Errors
 /// Store errors only.

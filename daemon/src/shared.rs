@@ -75,7 +75,7 @@ fn host_name() -> String {
     std::fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default().trim().to_owned()
 }
 
-/// What a daemon of this process tells others of itself; it looks for drops in the folders `keeps`.
+/// A daemon of this process, as it tells others of itself. It looks for drops in the folders `keeps`.
 pub(crate) fn station(config: &Config, keeps: Vec<String>) -> Station {
     Station {
         host: host_name(),

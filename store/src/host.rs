@@ -62,6 +62,11 @@ impl Host {
         self.station.roles.has(Role::Intake) && self.station.keeps.iter().any(|name| name == folder)
     }
 
+    /// Its folders in which it looks for drops.
+    pub fn kept(&self) -> impl Iterator<Item = &str> {
+        self.folders.iter().map(String::as_str).filter(|folder| self.keeps(folder))
+    }
+
     /// Does it claim anything at all?
     pub fn works(&self) -> bool {
         self.is_alive && !self.is_draining && self.station.roles.has(Role::Worker)

@@ -217,7 +217,7 @@ pub trait JobStore: Send + Sync {
         Ok(Vec::new())
     }
 
-    /// What this daemon tells of itself from now on, or from its next sign of life on while nobody can be told.
+    /// This daemon tells this of itself from now on, or from its next sign of life on while nobody can be told.
     fn announce(&self, station: &Station) {
         let _ = station;
     }

@@ -19,12 +19,12 @@ use super::weather::Weather;
 pub(super) const CALL: Duration = Duration::from_secs(60);
 /// So often a call is made before it counts as an outage, with a pause between that doubles.
 const TRIES: u32 = 4;
-/// A call on its way takes no longer once the daemon is to end, and none is made again.
-const LAST: Duration = if cfg!(test) { Duration::from_millis(200) } else { Duration::from_secs(10) };
-/// How often it is looked whether the daemon is to end.
-const TICK: Duration = Duration::from_millis(50);
 /// The same before the daemon has begun, which waits for them.
 const FIRST: (Duration, u32) = (Duration::from_secs(10), 1);
+/// A call on its way takes no longer once the daemon is to end, and none is made again.
+const LAST: Duration = if cfg!(test) { Duration::from_millis(200) } else { Duration::from_secs(10) };
+/// A call asks this often whether the daemon is to end.
+const TICK: Duration = Duration::from_millis(50);
 const FIRST_PAUSE: Duration = if cfg!(test) { Duration::from_micros(100) } else { Duration::from_millis(100) };
 
 /// A call may find this instead of what it is for.

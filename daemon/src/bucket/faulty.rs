@@ -36,7 +36,7 @@ struct State {
     left: Option<u32>,
     /// The last listing said this.
     listed: Vec<Listed>,
-    /// Who writes, and parts by number.
+    /// Their attributes, and parts by number.
     uploads: BTreeMap<String, (Attributes, BTreeMap<usize, Bytes>)>,
     /// Uploads so far.
     begun: u32,

@@ -1,4 +1,4 @@
-//! What a farm and this daemon tell each other: an operator says to the store whether it is drained, and it says in which folders it looks for drops.
+//! This daemon and its farm, by the store: an operator says there whether it is drained, and it says in which folders it looks for drops.
 
 use std::time::{Duration, Instant};
 
@@ -6,6 +6,7 @@ use suture_store::patience::brief;
 use suture_store::{Role, StoreError};
 
 use super::Keeper;
+use crate::folder::Folder;
 use crate::schedule::Hold;
 use crate::shared::station;
 
@@ -20,8 +21,9 @@ impl Keeper {
         let context = &self.context;
         let is_kept = |name: &str| self.folders.iter().any(|kept| kept.is_kept && kept.folder.name == name);
         // Of drops in a bucket, each daemon with that role looks for all.
-        let mine = context.folders.iter().filter(|folder| folder.bucket.is_some() || is_kept(&folder.name));
-        let keeps: Vec<String> = mine.filter(|_| context.has(Role::Intake)).map(|folder| folder.name.clone()).collect();
+        let looks = |folder: &Folder| context.has(Role::Intake) && (folder.bucket.is_some() || is_kept(&folder.name));
+        let keeps: Vec<String> =
+            context.folders.iter().filter(|folder| looks(folder)).map(|folder| folder.name.clone()).collect();
         if self.announced.as_ref() != Some(&keeps) {
             context.store.announce(&station(&context.settings.now(), keeps.clone()));
             self.announced = Some(keeps);

@@ -42,7 +42,7 @@ pub(super) struct Shown {
 impl From<Host> for Shown {
     fn from(host: Host) -> Self {
         let state = hosts::state(&host);
-        let keeps = host.folders.iter().filter(|folder| host.keeps(folder)).cloned().collect();
+        let keeps = host.kept().map(str::to_owned).collect();
         let Host { daemon, station, folders, began, seen, running, .. } = host;
         Self {
             daemon,

@@ -49,7 +49,7 @@ fn each_tells_what_it_is() {
         ]
     );
     assert_eq!(told(&PostgresStore::visit(&shared).unwrap()), hosts, "who only looks is no host");
-    // What changes is told at once.
+    // A change is told at once.
     let anew = Station { workers: 9, keeps: vec!["hot".into()], ..small.station };
     worker.announce(&anew);
     assert!(worker.hosts().unwrap().iter().any(|host| host.station == anew));

@@ -25,7 +25,7 @@ const SLACK: f64 = 1.02;
 /// The places of a wanted triangle that are looked at first are corners of so many parts along each of its sides.
 const STEPS: usize = 5;
 
-/// What reaches over a plane by less than this share of its own height does not.
+/// A part that reaches over a plane by less than this share of its height lies on one side of it.
 const FLAT: f64 = 1e-9;
 
 /// A part of a triangle, and the bound of its places.

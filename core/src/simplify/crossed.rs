@@ -53,12 +53,13 @@ impl Scene {
         let patch = &work.patch;
         let has_moved = |v: u32| patch.points[v as usize] != was.points[v as usize];
         let is_changed = |f: usize, face: [u32; 3]| was.corners[3 * f..3 * f + 3] != face || face.iter().any(|v| has_moved(*v));
-        let changed = patch.faces().filter(|(f, face)| is_changed(*f, *face));
-        let changed: Vec<Bounds> = changed.map(|(_, face)| Bounds::of(&patch.triangle(face))).collect();
-        if changed.is_empty() {
+        let changed = || patch.faces().filter(|(f, face)| is_changed(*f, *face));
+        let count = changed().count();
+        if count == 0 {
             return None;
         }
-        let tree = (FEW * changed.len() < patch.live).then(|| BoxTree::new(&changed));
+        let boxes = || changed().map(|(_, face)| Bounds::of(&patch.triangle(face))).collect::<Vec<_>>();
+        let tree = (FEW * count < patch.live).then(|| BoxTree::new(&boxes()));
         let is_near = |triangle: &Triangle| tree.as_ref().is_none_or(|tree| tree.meets(&Bounds::of(triangle)));
         let mut scene = Self::default();
         let (mut numbers, mut beyond) = (vec![NONE; patch.points.len()], BTreeMap::new());

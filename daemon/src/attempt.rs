@@ -324,7 +324,10 @@ impl Slot {
     fn attempt(&mut self, folder: &Folder, token: &Claim, job: &Job, turn: Turn) -> Result<Option<Job>, PublishError> {
         let context = Arc::clone(&self.context);
         if self.is_for_another(job) {
-            return Ok(Some(context.store.advance(token, Step::HandOn)?));
+            let began = context.world.steady();
+            let next = context.store.advance(token, Step::HandOn)?;
+            context.schedule.hand_on(began);
+            return Ok(Some(next));
         }
         let work = folder.work(token.token);
         // The token is new: a folder of that name was left by the daemon of another store, which had the hot folder before.

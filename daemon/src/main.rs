@@ -105,6 +105,7 @@ mod window;
 mod worker;
 mod world;
 mod writers;
+mod yielded;
 
 use std::process::ExitCode;
 

@@ -1,12 +1,11 @@
 //! Who may claim what, and when. Small files run side by side, one thread each; while a result is brought into place, which is waiting for the
-//! disk, the next file is computed. A large file runs alone, by all threads and with
-//! the whole memory: two of them at once would only fight for the same processors. A suspect (a file that was running when the
-//! daemon died, twice) runs alone too, after everything else.
+//! disk, the next file is computed. A large file runs alone, by all threads and with the whole memory: two of them at once would only fight for the same
+//! processors. A suspect (a file that was running when the daemon died, twice) runs alone too, after everything else.
 //!
-//! The higher priority goes first. So that small files do not wait behind a row of huge ones, of equal priority a large file's turn comes
-//! when no small one waits, or when none has had a turn for [`ALONE_AT_LEAST_EVERY`]. A job's priority grows while it waits (the store's
-//! business): who has risen by that is the equal of those who were asked for sooner, but not before them, so that a row of huge files
-//! grows no more urgent than small ones only because huge ones always wait.
+//! The higher priority goes first. So that small files do not wait behind a row of huge ones, of equal priority a large file's turn comes when no small one
+//! waits, or when none has had a turn for [`ALONE_AT_LEAST_EVERY`]. A job's priority grows while it waits (the store's business): who has risen by that is the
+//! equal of those who were asked for sooner, but not before them, so that a row of huge files grows no more urgent than small ones only because huge ones
+//! always wait.
 
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
@@ -16,11 +15,14 @@ use suture_store::{Filter, JobStore, Priority, StoreError, Waiting};
 
 use crate::config::Config;
 use crate::world::World;
+use crate::yielded::Yielded;
 
 /// However many small files of its priority come, one that runs alone has a turn this often.
 const ALONE_AT_LEAST_EVERY: Duration = Duration::from_secs(300);
 /// How often an idle slot asks again: pauses after errors end without anyone's word.
 const ASK_EVERY: Duration = Duration::from_secs(1);
+/// By then every daemon with an idle slot has asked once, and has its answer.
+const OTHERS_HAVE_ASKED: Duration = Duration::from_millis(1500);
 
 /// What a slot may claim next.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -120,6 +122,7 @@ struct State {
     most: usize,
     stop: bool,
     last_alone: Instant,
+    yielded: Yielded,
 }
 
 /// What waits for each kind of turn.
@@ -149,8 +152,8 @@ impl Waits {
 impl Schedule {
     pub(crate) fn new(world: Arc<dyn World>) -> Self {
         let last_alone = world.steady();
-        let state =
-            State { busy: 0, computing: 0, alone: false, held: Default::default(), most: usize::MAX, stop: false, last_alone };
+        let (held, yielded) = (Default::default(), Yielded::default());
+        let state = State { busy: 0, computing: 0, alone: false, held, most: usize::MAX, stop: false, last_alone, yielded };
         Self { state: Mutex::new(state), wake: Condvar::new(), world }
     }
 
@@ -208,6 +211,11 @@ impl Schedule {
         // Whoever looked before that waits by now.
         drop(self.lock());
         self.wake.notify_all();
+    }
+
+    /// A job was handed on since `began`: other daemons claim it, if they can.
+    pub(crate) fn hand_on(&self, began: Instant) {
+        self.lock().yielded.hand_on(began..self.world.steady(), OTHERS_HAVE_ASKED);
     }
 
     /// Gives nothing out for this reason, in words, or no longer. Returns whether that is news.
@@ -274,7 +282,7 @@ impl State {
         if self.stop {
             return Ok(Some(Turn::Stop));
         }
-        if !self.may_give() {
+        if !self.may_give() || self.yielded.holds(now) {
             return Ok(None);
         }
         let overdue = now.duration_since(self.last_alone) >= ALONE_AT_LEAST_EVERY;

@@ -40,7 +40,9 @@ pub use address::Address;
 pub use crash::crash_point;
 pub use host::{Host, Station};
 pub use id::{Attempt, Boot, Clock, Epoch, Hash, JobId, Recipe, Seq, SystemClock, Time, Token};
-pub use job::{Decision, Ending, Job, Kind, Past, Priority, Publication, Reached, Source, State, Step, Verdict, Witness};
+pub use job::{
+    Decision, Ending, HAND_ON_MS, Job, Kind, Past, Priority, Publication, Reached, Source, State, Step, Verdict, Witness,
+};
 pub use memory::MemoryStore;
 pub use news::{News, Notice, Word};
 pub use path::RelPath;

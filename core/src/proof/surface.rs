@@ -135,6 +135,19 @@ impl<'a> Surface<'a> {
         }
     }
 
+    /// The faces that hold a spot, if they are one, or two at an edge, and the second is [`NONE`] then; none for a vertex, and at an edge of other numbers.
+    #[inline]
+    pub(super) fn holders(&self, spot: &Spot) -> Option<[u32; 2]> {
+        let k = match spot.shares.map(|share| share == 0.0) {
+            [false, false, false] => return Some([spot.face, NONE]),
+            [true, false, false] => 1,
+            [false, true, false] => 2,
+            [false, false, true] => 0,
+            _ => return None,
+        };
+        Some([spot.face, self.beyond(spot.face, k)?])
+    }
+
     /// The face beyond the edge from corner `k` of a face on, if there is one, and only one.
     #[inline]
     pub(super) fn beyond(&self, face: u32, k: usize) -> Option<u32> {

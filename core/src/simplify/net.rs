@@ -47,19 +47,17 @@ impl Net {
             let kind = if is_fixed { FIXED } else { kind(around, constraints.feature) };
             ((kind, !around.is_closed()), quadric(around, constraints.feature))
         });
-        let (known, quadrics): (Vec<(u8, bool)>, Vec<Quadric>) = known.into_par_iter().unzip();
-        let open = (0..).zip(&known).filter(|(_, known)| known.1).map(|(v, _)| v).collect();
-        let kinds = known.into_iter().map(|known| known.0).collect();
-        Self {
-            points: points.to_vec(),
-            quadrics,
-            kinds,
-            strict: (0..points.len()).map(|v| constraints.strict.get(v).copied().unwrap_or(0)).collect(),
-            faces: faces.to_vec(),
-            origins: (0..faces.len() as u32).collect(),
-            homes: (0..points.len() as u32).collect(),
-            open,
-        }
+        let strict = |v: usize| constraints.strict.get(v).copied().unwrap_or(0);
+        let copies = || (points.to_vec(), faces.to_vec());
+        let numbers = || ((0..faces.len() as u32).collect(), (0..points.len() as u32).collect());
+        let of_known = || {
+            let (known, quadrics): (Vec<(u8, bool)>, Vec<Quadric>) = known.into_par_iter().unzip();
+            let open = (0..).zip(&known).filter(|(_, known)| known.1).map(|(v, _)| v).collect();
+            (known.into_iter().map(|known| known.0).collect(), quadrics, open)
+        };
+        let given = || (copies(), numbers(), (0..points.len()).map(strict).collect());
+        let (((points, faces), (origins, homes), strict), (kinds, quadrics, open)) = rayon::join(given, of_known);
+        Self { points, quadrics, kinds, strict, faces, origins, homes, open }
     }
 
     /// Gives all vertices the quadrics of the mesh as it is now: what it was before is forgotten. O(n).

@@ -5,6 +5,7 @@
 use crate::geometry::exact::Point;
 use crate::simplify::quadric::Quadric;
 use crate::util::ids::NONE;
+use crate::util::prefetch::prefetch;
 
 pub(super) use crate::algorithms::fans::MOST;
 
@@ -94,6 +95,29 @@ impl Patch {
         }
         let live = corners.len() / 3;
         Self { points, quadrics, kinds, strict, corners, became: (0..count as u32).collect(), next, first, counts, live }
+    }
+
+    /// Has the processor bring near what is known of a vertex.
+    #[inline]
+    pub(super) fn ask_for_vertex(&self, v: u32) {
+        let v = v as usize;
+        prefetch(&self.first, v);
+        prefetch(&self.points, v);
+        prefetch(&self.quadrics, v);
+    }
+
+    /// Has it bring near the quadric of a vertex alone.
+    #[inline]
+    pub(super) fn ask_for_quadric(&self, v: u32) {
+        prefetch(&self.quadrics, v as usize);
+    }
+
+    /// Has it bring near where the triangles around a vertex begin, which must be near itself.
+    #[inline]
+    pub(super) fn ask_for_star(&self, v: u32) {
+        let first = self.first[v as usize] as usize;
+        prefetch(&self.corners, first);
+        prefetch(&self.next, first);
     }
 
     /// The triangles around a vertex; false if they are none, or too many.

@@ -97,6 +97,16 @@ impl Queue {
         Some(entry)
     }
 
+    /// The entry that is taken from a bucket so many times from now, fewer than a chunk's, if none comes before; `None` where that is not known at once.
+    #[inline]
+    pub(super) fn ahead(&self, number: usize, times: usize) -> Option<Entry> {
+        let bucket = self.buckets.get(number).filter(|bucket| bucket.count as usize > times)?;
+        let at = bucket.start as usize + times;
+        let first = self.chunks.get(bucket.first as usize)?;
+        let chunk = if at < CHUNK { first } else { self.chunks.get(first.next as usize)? };
+        chunk.entries.get(at % CHUNK).copied()
+    }
+
     /// Adds an entry of a cost that is not negative.
     #[inline]
     pub(super) fn push(&mut self, cost: f32, entry: Entry) {
@@ -157,9 +167,13 @@ mod tests {
                 prop_assert_eq!(queue.counts().sum::<usize>(), want.len());
             }
             want.sort_unstable();
-            for (at, number) in want {
-                prop_assert_eq!(queue.cheapest(), Some(at));
-                prop_assert_eq!(queue.pop(at).map(|ends| ends[0]), Some(number));
+            for (place, (at, number)) in want.iter().enumerate() {
+                for times in 0..CHUNK {
+                    let later = want.get(place + times).filter(|later| later.0 == *at).map(|later| later.1);
+                    prop_assert_eq!(queue.ahead(*at, times).map(|ends| ends[0]), later);
+                }
+                prop_assert_eq!(queue.cheapest(), Some(*at));
+                prop_assert_eq!(queue.pop(*at).map(|ends| ends[0]), Some(*number));
             }
             prop_assert_eq!(queue.cheapest(), None);
         }

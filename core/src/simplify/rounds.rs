@@ -13,13 +13,17 @@ use crate::simplify::queue::BUCKETS;
 use crate::util::ids::NONE;
 
 /// The share of collapses still wanted that a step looks for, so that none goes too far.
-const STEP: f64 = 0.7;
+const STEP: f64 = 0.85;
 
 /// Steps of a round, at most; each does about a half of what is left.
 const STEPS: usize = 24;
 
 /// Items that a thread takes at once.
 const BLOCK: usize = 1 << 12;
+
+/// The share of the edges that the first step looks at that collapse, as is guessed: each collapse changes the price of about ten edges. Each step goes
+/// through the memory of all cells, so that few are wanted.
+const FIRST_YIELD: f64 = 0.2;
 
 /// A step looks at so many times as many edges as are to collapse, at most.
 const LEAST_YIELD: f64 = 0.02;
@@ -41,12 +45,8 @@ struct Parted {
     starts: Vec<usize>,
     /// By faces, its cell and its place there; [`NONE`] for the cell of those of more than one.
     face_seats: Vec<Seat>,
-    /// Vertices of such triangles.
-    is_shared: Vec<bool>,
-    /// By cells, which of these triangles reach into them.
-    obstacles: Vec<Vec<u32>>,
-    /// By cells, edges of these triangles with both ends in them, by numbers of vertices in the cell.
-    outer: Vec<Vec<[u32; 2]>>,
+    /// What is known of the latter.
+    between: Between,
 }
 
 impl Parted {
@@ -74,29 +74,15 @@ impl Parted {
         for (c, count) in counts.iter().enumerate() {
             starts[c + 1] = starts[c] + *count as usize;
         }
-        let mut faces = vec![0_u32; starts.last().copied().unwrap_or(0)];
-        let mut is_shared = vec![false; net.points.len()];
-        let mut obstacles = vec![Vec::new(); partition.cells.len()];
-        let mut outer = vec![Vec::new(); partition.cells.len()];
-        for (f, seat) in face_seats.iter().enumerate() {
-            if seat.cell != NONE {
+        let in_cells = || {
+            let mut faces = vec![0_u32; starts.last().copied().unwrap_or(0)];
+            for (f, seat) in face_seats.iter().enumerate().filter(|(_, seat)| seat.cell != NONE) {
                 faces[starts[seat.cell as usize] + seat.place as usize] = f as u32;
-                continue;
             }
-            let face = net.faces[f];
-            face.iter().for_each(|v| is_shared[*v as usize] = true);
-            let bounds = Bounds::of(&face.map(|v| net.points[v as usize]));
-            partition.each_meeting(&bounds, &mut |cell| obstacles[cell].push(f as u32));
-            for k in 0..3 {
-                let ends = [face[k], face[(k + 1) % 3]];
-                let [from, to] = ends.map(|v| seats[v as usize]);
-                if from.cell == to.cell {
-                    outer[from.cell as usize].push([from.place.min(to.place), from.place.max(to.place)]);
-                }
-            }
-        }
-        outer.iter_mut().for_each(|edges| edges.sort_unstable());
-        Self { partition, seats, faces, starts, face_seats, is_shared, obstacles, outer }
+            faces
+        };
+        let (faces, between) = rayon::join(in_cells, || Between::new(net, &partition, &seats, &face_seats));
+        Self { partition, seats, faces, starts, face_seats, between }
     }
 
     fn vertices(&self, c: usize) -> &[u32] {
@@ -119,7 +105,7 @@ impl Parted {
         let Before { points, corners } = self.before(net, c);
         let vertices = self.vertices(c);
         let quadrics = vertices.iter().map(|v| net.quadrics[*v as usize]).collect();
-        let kind = |v: &u32| if self.is_shared[*v as usize] { FIXED } else { net.kinds[*v as usize] };
+        let kind = |v: &u32| if self.between.is_shared[*v as usize] { FIXED } else { net.kinds[*v as usize] };
         let kinds = vertices.iter().map(kind).collect();
         let strict = vertices.iter().map(|v| net.strict[*v as usize]).collect();
         Patch::new(points, quadrics, [kinds, strict], corners)
@@ -130,8 +116,41 @@ impl Parted {
             let face = net.faces[*f as usize];
             (face, face.map(|v| net.points[v as usize]))
         };
-        let obstacles = self.obstacles[c].iter().map(triangle).collect();
-        Work::new(self.patch(net, c), self.partition.cells[c], (obstacles, self.outer[c].clone()), rules, is_guarded)
+        let obstacles = self.between.obstacles[c].iter().map(triangle).collect();
+        Work::new(self.patch(net, c), self.partition.cells[c], (obstacles, self.between.outer[c].clone()), rules, is_guarded)
+    }
+}
+
+/// Triangles of more than one cell.
+struct Between {
+    /// Their vertices.
+    is_shared: Vec<bool>,
+    /// By cells, which of them reach into it.
+    obstacles: Vec<Vec<u32>>,
+    /// By cells, edges of them with both ends in it, by numbers of vertices in the cell, in order.
+    outer: Vec<Vec<[u32; 2]>>,
+}
+
+impl Between {
+    fn new(net: &Net, partition: &Partition, seats: &[Seat], face_seats: &[Seat]) -> Self {
+        let mut is_shared = vec![false; net.points.len()];
+        let mut obstacles = vec![Vec::new(); partition.cells.len()];
+        let mut outer = vec![Vec::new(); partition.cells.len()];
+        for (f, _) in face_seats.iter().enumerate().filter(|(_, seat)| seat.cell == NONE) {
+            let face = net.faces[f];
+            face.iter().for_each(|v| is_shared[*v as usize] = true);
+            let bounds = Bounds::of(&face.map(|v| net.points[v as usize]));
+            partition.each_meeting(&bounds, &mut |cell| obstacles[cell].push(f as u32));
+            for k in 0..3 {
+                let ends = [face[k], face[(k + 1) % 3]];
+                let [from, to] = ends.map(|v| seats[v as usize]);
+                if from.cell == to.cell {
+                    outer[from.cell as usize].push([from.place.min(to.place), from.place.max(to.place)]);
+                }
+            }
+        }
+        outer.iter_mut().for_each(|edges| edges.sort_unstable());
+        Self { is_shared, obstacles, outer }
     }
 }
 
@@ -177,6 +196,8 @@ pub(super) fn round(net: &mut Net, rules: Rules, planes: Planes, goal: Goal) -> 
         .collect();
     let is_limited = works.iter().any(|work| work.is_limited);
     let became = merge(net, &parted, &works);
+    // To give memory back takes its time, too.
+    works.into_par_iter().for_each(drop);
     Round { became, redone: redone.into_iter().filter(|was| *was).count(), is_limited }
 }
 
@@ -201,7 +222,7 @@ fn advance(works: &mut [Work], wanted: usize) {
         return;
     }
     // The share of the edges looked at that collapse: the others are stale, or may not.
-    let mut yields = 1.0;
+    let mut yields = FIRST_YIELD;
     for step in 0..STEPS {
         let live: usize = works.iter().map(|work| work.patch.live).sum();
         let Some(excess) = live.checked_sub(wanted).filter(|excess| *excess > 0) else { return };

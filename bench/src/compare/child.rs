@@ -140,8 +140,8 @@ struct Waited {
     looks: u32,
 }
 
-/// After so many looks, 20 milliseconds, a process has run its own program for a while.
-const LOOKS: u32 = 8;
+/// After so many looks, 11 milliseconds, a process has run its own program for a while.
+const LOOKS: u32 = 6;
 
 /// Memory of a process and of all that it started, in bytes; what cannot be read counts as none.
 #[derive(Clone, Copy, Debug, Default)]

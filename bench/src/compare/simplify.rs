@@ -33,8 +33,9 @@ pub(crate) struct Asked {
     pub(crate) judge_up_to: u64,
 }
 
-/// Samples on each surface, beside its vertices where these are fewer.
-const SAMPLES: usize = 200_000;
+/// Corners of triangles of a surface that are samples, and as many places spread by area: as many as it has triangles, within these bounds. Of ten
+/// million triangles, the farthest of a few hundred thousand samples is a matter of luck.
+const SAMPLES: [usize; 2] = [100_000, 2_000_000];
 /// The generated surface, and the numbers by which it is made.
 const CASE: Case = Case::Clean;
 const SEED: u64 = 1;
@@ -143,9 +144,11 @@ fn diagonal(triangles: &[Triangle]) -> f64 {
 /// How far samples on one surface are from another one: its vertices, evenly taken, and as many places spread by area.
 fn distances(from: &[Triangle], to: &[Triangle]) -> Vec<f64> {
     let near = Near::new(to);
-    let stride = (3 * from.len()).div_ceil(SAMPLES / 2).max(1);
+    let [least, most] = SAMPLES;
+    let samples = from.len().clamp(least, most);
+    let stride = (3 * from.len()).div_ceil(samples).max(1);
     let corners = from.as_flattened().iter().step_by(stride).map(|p| wide(*p));
-    corners.chain(spread(from, SAMPLES / 2)).map(|p| near.distance(p)).collect()
+    corners.chain(spread(from, samples)).map(|p| near.distance(p)).collect()
 }
 
 /// Places spread over triangles by area: equal steps of area decide the triangle, a sequence of low discrepancy the place in it

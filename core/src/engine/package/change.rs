@@ -7,7 +7,7 @@ use std::path::Path;
 
 use memmap2::Mmap;
 
-use super::corners::Corners;
+use super::corners::Triangles;
 use super::section::section;
 use super::units::{self, UnitOf};
 use crate::contract::error::{Error, Result};
@@ -35,9 +35,8 @@ struct NewText {
 /// An object that was repaired: what it should be in the output.
 pub(super) struct Expected {
     pub(super) place: Place,
-    /// Of all corners, in order.
-    pub(super) hash: blake3::Hash,
-    pub(super) triangles: u64,
+    /// The triangles of its meshes, one after the other.
+    pub(super) units: Vec<Triangles>,
 }
 
 /// Repairs the objects of a package one after the other.
@@ -124,13 +123,11 @@ impl<'a> Maker<'a> {
 
     /// Notes what the object should be in the output.
     fn expect(&mut self, place: Place, units: &[UnitOf], mended: &[Option<Mended>], read: &MeshRecords) {
-        let mut corners = Corners::default();
-        for (unit, mended) in units.iter().zip(mended) {
+        let of = |(unit, mended): (&UnitOf, &Option<Mended>)| {
             let result = mended.as_ref().and_then(|mended| mended.result.as_ref());
-            corners.add(result.map_or_else(|| records_of(unit, read), MeshFile::records));
-        }
-        let (hash, triangles) = corners.finish();
-        self.expected.push(Expected { place, hash, triangles });
+            Triangles::of(result.map_or_else(|| records_of(unit, read), MeshFile::records))
+        };
+        self.expected.push(Expected { place, units: units.iter().zip(mended).map(of).collect() });
     }
 
     fn write(&mut self, place: Place, text: &MeshText<'_>, units: &[Unit<'_>]) -> Result<()> {

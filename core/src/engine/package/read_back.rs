@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::change::Changed;
-use super::corners::Corners;
+use super::corners::Triangles;
 use crate::contract::error::{Error, Result};
 use crate::engine::work::Work;
 use crate::io::read::PackageFile;
@@ -24,16 +24,19 @@ pub(super) fn confirm(package: &PackageFile, output: &Path, changed: &Changed, w
     }
     for (place, expected) in places.into_iter().zip(&changed.expected) {
         let read = written.read(place, work.limits, work.progress)?;
-        let mut corners = Corners::default();
-        corners.add(read.parsed.records.all());
-        let (hash, triangles) = corners.finish();
-        let names = written.names(place);
-        if names != package.names(expected.place) || triangles != expected.triangles {
-            let (id, _, part) = names;
-            return Err(differs(format!("object {id} of {part} has {triangles} triangles, not {}", expected.triangles)));
+        let mut left = read.parsed.records.all();
+        let (names, count) = (written.names(place), left.len() as u64);
+        let (id, part) = (names.0, &names.2);
+        let wanted: u64 = expected.units.iter().map(|unit| unit.count).sum();
+        if names != package.names(expected.place) || count != wanted {
+            return Err(differs(format!("object {id} of {part} has {count} triangles, not {wanted}")));
         }
-        if hash != expected.hash {
-            return Err(differs(format!("object {} of {} has other corners", names.0, names.2)));
+        for unit in &expected.units {
+            let (own, others) = left.split_at(left.len().min(unit.count as usize));
+            if Triangles::of(own) != *unit {
+                return Err(differs(format!("object {id} of {part} has other corners")));
+            }
+            left = others;
         }
     }
     Ok(written)

@@ -1,10 +1,13 @@
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use crate::contract::report::{Outcome, Report};
 use crate::contract::settings::{KeepAttributes, Limits, OutputFormat, Profile};
+use crate::geometry::position;
 use crate::io::read::archive_build::{Member, member, zip};
 use crate::io::read::{Archive, PackageFile};
 use crate::output::model::Elements;
+use crate::testing::shaken_torus;
 use crate::{Quiet, repair};
 
 const CORE: &str = "http://schemas.microsoft.com/3dmanufacturing/core/2015/02";
@@ -129,6 +132,25 @@ fn a_hole_is_filled_in_the_colour_of_its_rim_and_all_else_stays() {
     for name in ["[Content_Types].xml", "_rels/.rels", "Metadata/thumbnail.png", "Metadata/strange.bin"] {
         assert_eq!(raw(&input, name), raw(&repaired.bytes(), name), "{name}");
     }
+}
+
+/// A torus with two triangles without area, which go, and two holes, whose triangles come in the places of those; then most of all go.
+#[test]
+fn a_repaired_object_is_made_simpler() {
+    let whole = shaken_torus(0.0);
+    let vertices: Vec<[u32; 3]> = whole.iter().flatten().map(|corner| position::bits(*corner)).collect();
+    let numbers: BTreeMap<[u32; 3], usize> = vertices.iter().collect::<BTreeSet<_>>().into_iter().copied().zip(0..).collect();
+    let text = |corner: &[u32; 3]| {
+        let [x, y, z] = corner.map(f32::from_bits);
+        format!("<vertex x=\"{x}\" y=\"{y}\" z=\"{z}\"/>")
+    };
+    let mut faces: Vec<[usize; 3]> = vertices.chunks(3).map(|corners| [0, 1, 2].map(|k: usize| numbers[&corners[k]])).collect();
+    faces.remove(whole.len() / 2);
+    faces.remove(10);
+    faces.splice(3..3, [[7, 7, 7], [9, 9, 9]]);
+    let input = package(&[object(1, &numbers.keys().map(text).collect::<String>(), &triangles(&faces, |_| String::new()))], &[]);
+    let repaired = Repaired::of(&input, &Profile { simplify_triangles: 20_000, ..Profile::default() });
+    assert_eq!((repaired.report.outcome, repaired.text().matches("<triangle ").count()), (Outcome::Repaired, 20_000));
 }
 
 #[test]

@@ -1,6 +1,8 @@
 //! One triangle as the 50 bytes of a binary STL: normal and three corners as twelve little-endian `f32`, then the attribute
 //! word as `u16`. Everything in the engine refers to these bytes where they lie; nothing keeps a decoded copy of a mesh.
 
+use crate::util::prefetch::hint;
+
 /// The bytes of one triangle: normal at 0, corners at 12, 24 and 36, attribute at 48.
 pub type Record = [u8; 50];
 
@@ -30,13 +32,7 @@ pub fn corners(record: &Record) -> [Point; 3] {
 pub(crate) fn prefetch_after(record: &Record) {
     /// About what is on its way at a time.
     const BYTES: usize = 1600;
-    #[cfg(target_arch = "x86_64")]
-    // SAFETY: a hint, which reads nothing and cannot fail, wherever it points.
-    unsafe {
-        std::arch::x86_64::_mm_prefetch::<{ std::arch::x86_64::_MM_HINT_T0 }>(record.as_ptr().wrapping_add(BYTES).cast());
-    }
-    #[cfg(not(target_arch = "x86_64"))]
-    let _ = (record, BYTES);
+    hint(record.as_ptr().wrapping_add(BYTES));
 }
 
 /// The normal as it stands in the file, which may be zero, wrong or not a number.

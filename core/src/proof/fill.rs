@@ -110,7 +110,7 @@ pub(super) struct Cut<'c> {
 pub(super) struct Lists {
     /// The loop.
     pub(super) rim: Vec<Pair>,
-    /// What is left of it.
+    /// The steps of it that are not cut off yet.
     steps: Vec<Step>,
     piece: Vec<Pair>,
 }

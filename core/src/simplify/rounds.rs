@@ -45,7 +45,7 @@ struct Parted {
     starts: Vec<usize>,
     /// By faces, its cell and its place there; [`NONE`] for the cell of those of more than one.
     face_seats: Vec<Seat>,
-    /// What is known of the latter.
+    /// Facts of the triangles of more than one cell.
     between: Between,
 }
 

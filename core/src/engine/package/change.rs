@@ -123,9 +123,10 @@ impl<'a> Maker<'a> {
 
     /// Notes what the object should be in the output.
     fn expect(&mut self, place: Place, units: &[UnitOf], mended: &[Option<Mended>], read: &MeshRecords) {
+        let threads = self.work.limits.threads;
         let of = |(unit, mended): (&UnitOf, &Option<Mended>)| {
             let result = mended.as_ref().and_then(|mended| mended.result.as_ref());
-            Triangles::of(result.map_or_else(|| records_of(unit, read), MeshFile::records))
+            Triangles::of(result.map_or_else(|| records_of(unit, read), MeshFile::records), threads)
         };
         self.expected.push(Expected { place, units: units.iter().zip(mended).map(of).collect() });
     }

@@ -1,9 +1,8 @@
 //! Triangles by their corners, whatever their order.
 
-use rayon::prelude::*;
-
 use crate::geometry::position;
 use crate::io::record::Record;
+use crate::util::parallel;
 
 /// Records that a thread takes at once.
 const BLOCK: usize = 1 << 12;
@@ -18,10 +17,11 @@ pub(super) struct Triangles {
 }
 
 impl Triangles {
-    /// O(n).
-    pub(super) fn of(records: &[Record]) -> Self {
-        let sums = records.par_chunks(BLOCK).map(sum).reduce(Default::default, plus);
-        Self { sums, count: records.len() as u64 }
+    /// O(n), on so many threads.
+    pub(super) fn of(records: &[Record], threads: usize) -> Self {
+        let blocks: Vec<&[Record]> = records.chunks(BLOCK).collect();
+        let sums = parallel::map(threads, blocks.len(), |block| sum(blocks[block]));
+        Self { sums: sums.into_iter().fold(Default::default(), plus), count: records.len() as u64 }
     }
 }
 
@@ -47,13 +47,13 @@ mod tests {
     #[test]
     fn the_order_of_triangles_is_nothing_and_that_of_their_corners_is_not() {
         let mut all = cube();
-        let before = Triangles::of(&records(&all));
+        let before = Triangles::of(&records(&all), 2);
         all.rotate_left(5);
-        assert_eq!(Triangles::of(&records(&all)), before);
+        assert_eq!(Triangles::of(&records(&all), 2), before);
         all[3].swap(0, 1);
-        assert_ne!(Triangles::of(&records(&all)), before);
+        assert_ne!(Triangles::of(&records(&all), 2), before);
         all[3].swap(0, 1);
         all.push(all[3]);
-        assert_ne!(Triangles::of(&records(&all)), before);
+        assert_ne!(Triangles::of(&records(&all), 2), before);
     }
 }

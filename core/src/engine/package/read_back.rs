@@ -33,7 +33,7 @@ pub(super) fn confirm(package: &PackageFile, output: &Path, changed: &Changed, w
         }
         for unit in &expected.units {
             let (own, others) = left.split_at(left.len().min(unit.count as usize));
-            if Triangles::of(own) != *unit {
+            if Triangles::of(own, work.limits.threads) != *unit {
                 return Err(differs(format!("object {id} of {part} has other corners")));
             }
             left = others;

@@ -2,7 +2,6 @@
 
 use glam::DVec3;
 
-use crate::geometry::distance::place;
 use crate::geometry::exact::Point;
 use crate::geometry::tri_tri::Triangle;
 use crate::simplify::guard::Guard;
@@ -10,6 +9,7 @@ use crate::simplify::legal::{self, Marks};
 use crate::simplify::partition;
 use crate::simplify::patch::{CREASE, FIXED, MOST, Patch, RIM, Star};
 use crate::simplify::queue::{self, Queue};
+use crate::simplify::task::Barred;
 
 /// A short edge is cheaper by this share of its length, squared, where surfaces are flat, so that triangles stay round.
 const STABILITY: f64 = 1e-3;
@@ -24,7 +24,9 @@ pub(super) const LIMITS: usize = 3;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Rules {
     pub(super) shape: legal::Bounds,
-    /// The largest value of a quadric by its weight, without the share for short edges: a squared length, by how strict a vertex is.
+    /// What lengths are multiplied by: a power of two, by which the mesh has about the size 1, so that no quadric is out of the range of f32.
+    pub(super) unit: f64,
+    /// The largest value of a quadric by its weight, without the share for short edges: a squared length in this unit, by how strict a vertex is.
     pub(super) limits: [f64; LIMITS],
     /// New vertices may lie where the quadric is least, besides at the ends and the middle of the edge.
     pub(super) optimal: bool,
@@ -41,8 +43,8 @@ pub(super) struct Work {
     pub(super) obstacles: Vec<Obstacle>,
     /// Edges of such triangles with both ends in this cell, the smaller one first, in order.
     outer: Vec<[u32; 2]>,
-    /// Edges were left alone because of what their quadrics would be.
-    pub(super) is_limited: bool,
+    /// Why edges were left alone.
+    pub(super) barred: Barred,
     rules: Rules,
     queue: Queue,
     guard: Option<Guard>,
@@ -65,7 +67,8 @@ impl Work {
         let marks = Marks::new(patch.points.len());
         let queue = Queue::new(patch.corners.len());
         let (is_refused, stars) = (vec![false; patch.points.len()], Default::default());
-        let mut work = Self { patch, cell, obstacles, outer, is_limited: false, rules, queue, guard, marks, stars, is_refused };
+        let mut work =
+            Self { patch, cell, obstacles, outer, barred: Barred::default(), rules, queue, guard, marks, stars, is_refused };
         for corner in 0..work.patch.corners.len() {
             let after = if corner % 3 == 2 { corner - 2 } else { corner + 1 };
             let ends = [work.patch.corners[corner], work.patch.corners[after]];
@@ -92,7 +95,7 @@ impl Work {
         let (value, cost, to) = self.price(ends)?;
         let strict = ends.iter().map(|v| usize::from(self.patch.strict[*v as usize])).fold(0, usize::max);
         if value > self.rules.limits[strict.min(LIMITS - 1)] {
-            self.is_limited = true;
+            self.barred.by_distance = true;
             self.refuse(ends);
             return None;
         }
@@ -115,8 +118,8 @@ impl Work {
         if kinds == [FIXED; 2] || kinds == [CREASE, RIM] || kinds == [RIM, CREASE] {
             return None;
         }
-        let from = place(patch.points[i]);
-        let edge = place(patch.points[j]) - from;
+        let from = patch.place_of(u);
+        let edge = patch.place_of(v) - from;
         let sum = patch.quadrics[i].wide().plus(&patch.quadrics[j].wide().around(-edge));
         let share = sum.weight().max(1.0).recip();
         let scale = share.sqrt();
@@ -130,7 +133,7 @@ impl Work {
             let (value, cost) = cost(x);
             return Some((value, cost, point));
         }
-        let rounded = |x: DVec3| (from + x).to_array().map(|x| x as f32 + 0.0);
+        let rounded = |x: DVec3| patch.point(from + x);
         let least = (self.rules.optimal && kinds[0] != CREASE)
             .then(|| sum.least(2.0 * STABILITY * STABILITY / scale, 0.5 * edge))
             .filter(|x| x.length_squared() < 4.0 * edge.length_squared());
@@ -168,6 +171,7 @@ impl Work {
             if queue::bucket(cost) > bucket {
                 self.queue.push(cost, ends);
             } else if !self.collapse(ends, to, &mut stars) {
+                self.barred.by_rules = true;
                 self.refuse(ends);
             }
         }
@@ -197,6 +201,7 @@ impl Work {
         of_u.iter().for_each(|(_, [w, _])| self.patch.ask_for_quadric(w));
         let stays = to == self.patch.points[v as usize];
         let shape = self.rules.shape;
+        let patch = &self.patch;
         let is_rim = self.patch.kinds[u as usize] == RIM;
         let is_joined = |w: u32| {
             self.patch.kinds[v as usize] == FIXED
@@ -206,19 +211,15 @@ impl Work {
         let is_legal = self.cell.holds(&to)
             && to.iter().all(|x| x.is_finite())
             && legal::keeps_topology(([u, v], is_rim), of_u, of_v, &mut self.marks, is_joined)
-            && legal::keeps_shape(&self.patch, [u, v], of_u, &to, shape.turn)
-            && (stays || legal::keeps_shape(&self.patch, [v, u], of_v, &to, shape.turn))
-            && legal::keeps_features(&self.patch, [u, v], of_u, shape.feature)
-            && of_u
-                .iter()
-                .filter(|(_, ring)| ring.contains(&v))
-                .all(|(_, ring)| ring.iter().all(|w| self.patch.count(*w) <= MOST))
-            && self.guard.as_mut().is_none_or(|guard| guard.allows(&self.patch, [u, v], &to, of_u, of_v));
+            && legal::keeps_shape(patch, [u, v], of_u, &to, shape.turn)
+            && (stays || legal::keeps_shape(patch, [v, u], of_v, &to, shape.turn))
+            && legal::keeps_features(patch, [u, v], of_u, shape.feature)
+            && self.guard.as_mut().is_none_or(|guard| guard.allows(patch, [u, v], &to, of_u, of_v));
         if !is_legal {
             return false;
         }
         let patch = &mut self.patch;
-        let at = |w: u32| patch.quadrics[w as usize].wide().around(place(to) - place(patch.points[w as usize]));
+        let at = |w: u32| patch.quadrics[w as usize].wide().around(patch.place(&to) - patch.place_of(w));
         patch.quadrics[v as usize] = at(u).plus(&at(v)).narrow();
         patch.points[v as usize] = to;
         patch.merge([u, v], of_u, of_v);

@@ -194,12 +194,13 @@ mod tests {
     fn is_crossed(to: Point, tip: Point) -> bool {
         let points = vec![[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0], tip];
         let corners = vec![0, 2, 1, 0, 1, 3, 1, 2, 3, 2, 0, 3];
-        let patch =
-            |points: Vec<Point>| Patch::new(points, vec![Quadric::default(); 4], [vec![FREE; 4], vec![0; 4]], corners.clone());
+        let patch = |points: Vec<Point>| {
+            Patch::new(points, vec![Quadric::default(); 4], [vec![FREE; 4], vec![0; 4]], corners.clone(), 1.0)
+        };
         let was = Before { points: points.clone(), corners: corners.clone() };
         let [lo, hi] = EVERYWHERE;
         let shape = legal::Bounds { turn: 0.0, feature: -2.0 };
-        let rules = Rules { shape, limits: [1.0; LIMITS], optimal: false };
+        let rules = Rules { shape, unit: 1.0, limits: [1.0; LIMITS], optimal: false };
         let obstacle = ([7, 8, 9], [[0.0, 0.0, 9.0], [4.0, 0.0, 9.0], [0.0, 4.0, 9.0]]);
         let mut work = Work::new(patch(points), Cell { lo, hi, start: 0, end: 4 }, (vec![obstacle], Vec::new()), rules, false);
         work.patch.points[3] = to;

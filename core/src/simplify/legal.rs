@@ -2,12 +2,17 @@
 
 use glam::DVec3;
 
-use crate::geometry::distance::place;
 use crate::geometry::exact::Point;
-use crate::simplify::patch::{CREASE, FIXED, FREE, Patch, RIM, Star};
+use crate::simplify::patch::{CREASE, FIXED, FREE, Patch, RIM, Star, longest};
 
-/// Triangles flatter than this share of an equilateral one's area are not made, unless they were flatter before.
+/// Triangles flatter than this share of an equilateral one's area are not made, unless the surface was as thin or as flat there before.
 const LEAST_SHAPE: f64 = 0.03;
+
+/// The share of the square of the least height that there was before: in a strip, triangles whose sides are four times as long on one side as on the other.
+const LEAST_HEIGHT: f64 = 1.0 / 16.0;
+
+/// The square of the doubled area by that of the sum of the squared sides from which on an area is more than rounding.
+const NO_AREA: f64 = 1e-20;
 
 /// Bounds of what a collapse may do.
 #[derive(Clone, Copy, Debug)]
@@ -93,12 +98,14 @@ pub(super) fn keeps_topology(
 }
 
 /// Does each triangle of a star, but those with `gone`, keep its direction and its shape when its vertex goes to `to`?
+///
+/// A flat triangle is made where it is about as high as the lowest one around both was at first, so that those of thin walls, and needles, become longer.
 #[inline]
 pub(super) fn keeps_shape(patch: &Patch, [v, gone]: [u32; 2], star: &Star, to: &Point, turn: f64) -> bool {
-    let from = place(patch.points[v as usize]);
-    let to = place(*to);
+    let from = patch.place_of(v);
+    let to = patch.place(to);
     star.iter().filter(|(_, ring)| !ring.contains(&gone)).all(|(_, [a, b])| {
-        let [a, b] = [a, b].map(|w| place(patch.points[w as usize]));
+        let [a, b] = [a, b].map(|w| patch.place_of(w));
         let (old, new) = ((a - from).cross(b - from), (a - to).cross(b - to));
         let (old_square, new_square, dot) = (old.length_squared(), new.length_squared(), old.dot(new));
         let edge = (b - a).length_squared();
@@ -106,11 +113,11 @@ pub(super) fn keeps_shape(patch: &Patch, [v, gone]: [u32; 2], star: &Star, to: &
         let keeps_direction =
             if old_square > 0.0 { dot > 0.0 && dot * dot >= turn * turn * old_square * new_square } else { true };
         // 2√3 times the doubled area over the sum of the squared sides: 1 for an equilateral triangle.
-        let (new_sides, old_sides) = (sides(to), sides(from));
+        let new_sides = sides(to);
         let bound = LEAST_SHAPE * LEAST_SHAPE / 12.0;
         let keeps_form = new_square > bound * new_sides * new_sides
-            || (new_square * old_sides * old_sides >= old_square * new_sides * new_sides
-                && new_square > 1e-12 * new_sides * new_sides);
+            || (new_square > NO_AREA * new_sides * new_sides
+                && new_square >= LEAST_HEIGHT * patch.low([v, gone]) * longest([a, b, to]));
         keeps_direction && keeps_form
     })
 }
@@ -130,7 +137,7 @@ pub(super) fn keeps_features(patch: &Patch, [u, v]: [u32; 2], of_u: &Star, featu
 /// The cosine of the angle of the two triangles of a star that have `v`.
 fn angle_at(patch: &Patch, v: u32, star: &Star) -> Option<f64> {
     let mut normals = star.iter().filter(|(_, ring)| ring.contains(&v)).map(|(corner, _)| {
-        let [a, b, c] = patch.triangle(patch.face(corner as usize / 3)).map(place);
+        let [a, b, c] = patch.face(corner as usize / 3).map(|w| patch.place_of(w));
         (b - a).cross(c - a).normalize_or_zero()
     });
     let (first, second) = (normals.next()?, normals.next()?);

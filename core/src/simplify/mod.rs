@@ -75,7 +75,8 @@ fn in_cells(input: &Input<'_>, options: &Options, cell: usize) -> Result<Outcome
     let mut held = Held::new(input);
     let bounds = Bounds::of(input.points);
     let most = most(options, &bounds);
-    let course = Course { input, options, most, cell, feature: options.feature_angle.map_or(-2.0, f64::cos) };
+    let feature = options.feature_angle.map_or(-2.0, f64::cos);
+    let course = Course { input, options, most, cell, feature, unit: unit(bounds.diagonal()) };
     let mut made = course.first(&held);
     if !options.prove && options.max_deviation.is_none() {
         return Ok(measured(made.outcome(input), input, &bounds));
@@ -97,7 +98,7 @@ fn in_cells(input: &Input<'_>, options: &Options, cell: usize) -> Result<Outcome
     outcome.attempts = held.attempt + 1;
     outcome.proved = Some(verdict.proved);
     if held.attempt > 0 && outcome.ended == Ended::Edges {
-        outcome.ended = Ended::Deviation;
+        outcome.ended = Ended::Both;
     }
     Ok(measured(outcome, input, &bounds))
 }
@@ -109,6 +110,11 @@ fn most(options: &Options, bounds: &Bounds) -> f64 {
         (None, Some(_)) => MOST_DEVIATION * bounds.diagonal(),
         (None, None) => f64::INFINITY,
     }
+}
+
+/// The power of two by which a length becomes about 1.
+fn unit(length: f64) -> f64 {
+    if length > 0.0 { 2.0_f64.powi(-length.log2().floor() as i32) } else { 1.0 }
 }
 
 /// Fills in the volumes.

@@ -2,6 +2,9 @@
 //!
 //! Corner 3f + k is corner k of face f. All corners at one vertex are linked in a circle, in no order. Two circles become one by an exchange of two links.
 
+use glam::DVec3;
+
+use crate::geometry::distance;
 use crate::geometry::exact::Point;
 use crate::simplify::quadric::Quadric;
 use crate::util::ids::NONE;
@@ -64,6 +67,10 @@ pub(super) struct Patch {
     first: Vec<u32>,
     /// How many triangles each vertex has.
     counts: Vec<u32>,
+    /// For each vertex, the square of the least height of the triangles that were there at first, around it and all that have become it.
+    lows: Vec<f32>,
+    /// What positions are multiplied by: a power of two, so that nothing is rounded.
+    unit: f64,
     /// Triangles that are there.
     pub(super) live: usize,
 }
@@ -77,9 +84,21 @@ fn others(corner: u32) -> [u32; 2] {
     }
 }
 
+/// The square of the longest side.
+#[inline]
+pub(super) fn longest([a, b, c]: [DVec3; 3]) -> f64 {
+    (b - a).length_squared().max((c - b).length_squared()).max((a - c).length_squared())
+}
+
 impl Patch {
-    /// Of triangles by numbers of vertices, each of which has a point, a quadric, a kind and a limit.
-    pub(super) fn new(points: Vec<Point>, quadrics: Vec<Quadric>, [kinds, strict]: [Vec<u8>; 2], corners: Vec<u32>) -> Self {
+    /// Of triangles by numbers of vertices, each of which has a point, a quadric, a kind and a limit. Lengths are multiplied by `unit`, a power of two.
+    pub(super) fn new(
+        points: Vec<Point>,
+        quadrics: Vec<Quadric>,
+        [kinds, strict]: [Vec<u8>; 2],
+        corners: Vec<u32>,
+        unit: f64,
+    ) -> Self {
         let count = points.len();
         let mut next = vec![NONE; corners.len()];
         let mut first = vec![NONE; count];
@@ -94,7 +113,50 @@ impl Patch {
             }
         }
         let live = corners.len() / 3;
-        Self { points, quadrics, kinds, strict, corners, became: (0..count as u32).collect(), next, first, counts, live }
+        let became = (0..count as u32).collect();
+        let mut patch =
+            Self { points, quadrics, kinds, strict, corners, became, next, first, counts, lows: Vec::new(), unit, live };
+        patch.lows = patch.lowest();
+        patch
+    }
+
+    /// For each vertex, the square of the least height of the triangles around it. O(n).
+    fn lowest(&self) -> Vec<f32> {
+        let mut lows = vec![f32::INFINITY; self.points.len()];
+        for face in self.corners.chunks_exact(3).map(|c| [c[0], c[1], c[2]]) {
+            let [a, b, c] = face.map(|v| self.place_of(v));
+            let square = ((b - a).cross(c - a).length_squared() / longest([a, b, c])) as f32;
+            for v in face {
+                // The least height of a triangle without extent is no number, and is none here.
+                lows[v as usize] = lows[v as usize].min(square);
+            }
+        }
+        lows
+    }
+
+    /// The square of the least height of the triangles around two vertices, and all that have become them, as they were at first.
+    #[inline]
+    pub(super) fn low(&self, ends: [u32; 2]) -> f64 {
+        let [a, b] = ends.map(|v| self.lows[v as usize]);
+        a.min(b).into()
+    }
+
+    /// A position in the unit of lengths.
+    #[inline]
+    pub(super) fn place(&self, point: &Point) -> DVec3 {
+        distance::place(*point) * self.unit
+    }
+
+    /// The position of a vertex in the unit of lengths.
+    #[inline]
+    pub(super) fn place_of(&self, v: u32) -> DVec3 {
+        self.place(&self.points[v as usize])
+    }
+
+    /// The position nearest to a place in the unit of lengths.
+    #[inline]
+    pub(super) fn point(&self, place: DVec3) -> Point {
+        (place / self.unit).to_array().map(|x| x as f32 + 0.0)
     }
 
     /// Has the processor bring near what is known of a vertex.
@@ -125,7 +187,7 @@ impl Patch {
     pub(super) fn star(&self, v: u32, star: &mut Star) -> bool {
         star.len = 0;
         let first = self.first[v as usize];
-        if first == NONE {
+        if first == NONE || self.count(v) > MOST {
             return false;
         }
         let mut corner = first;
@@ -175,9 +237,12 @@ impl Patch {
                 self.corners[c as usize] = NONE;
             }
             self.corners[corner as usize] = NONE;
-            self.unlink(wing);
             self.counts[wing as usize] -= 1;
             self.live -= 1;
+            // Nobody goes round a vertex of more, whose corners would be gone through for each of them.
+            if self.count(wing) <= MOST {
+                self.unlink(wing);
+            }
         }
         for (corner, _) in of_u.without(v) {
             self.corners[corner as usize] = v;
@@ -187,6 +252,7 @@ impl Patch {
         let gone = of_u.iter().filter(|(_, ring)| ring.contains(&v)).count();
         self.counts[v as usize] = (of_u.len + of_v.len - 2 * gone) as u32;
         self.became[u as usize] = v;
+        self.lows[v as usize] = self.lows[v as usize].min(self.lows[u as usize]);
         self.strict[v as usize] = self.strict[v as usize].max(self.strict[u as usize]);
     }
 

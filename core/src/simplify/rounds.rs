@@ -10,6 +10,7 @@ use crate::simplify::net::Net;
 use crate::simplify::partition::{Partition, Planes};
 use crate::simplify::patch::{FIXED, Patch};
 use crate::simplify::queue::BUCKETS;
+use crate::simplify::task::Barred;
 use crate::util::ids::NONE;
 
 /// The share of collapses still wanted that a step looks for, so that none goes too far.
@@ -101,14 +102,14 @@ impl Parted {
         Before { points, corners }
     }
 
-    fn patch(&self, net: &Net, c: usize) -> Patch {
+    fn patch(&self, net: &Net, c: usize, unit: f64) -> Patch {
         let Before { points, corners } = self.before(net, c);
         let vertices = self.vertices(c);
         let quadrics = vertices.iter().map(|v| net.quadrics[*v as usize]).collect();
         let kind = |v: &u32| if self.between.is_shared[*v as usize] { FIXED } else { net.kinds[*v as usize] };
         let kinds = vertices.iter().map(kind).collect();
         let strict = vertices.iter().map(|v| net.strict[*v as usize]).collect();
-        Patch::new(points, quadrics, [kinds, strict], corners)
+        Patch::new(points, quadrics, [kinds, strict], corners, unit)
     }
 
     fn work(&self, net: &Net, c: usize, rules: Rules, is_guarded: bool) -> Work {
@@ -117,7 +118,13 @@ impl Parted {
             (face, face.map(|v| net.points[v as usize]))
         };
         let obstacles = self.between.obstacles[c].iter().map(triangle).collect();
-        Work::new(self.patch(net, c), self.partition.cells[c], (obstacles, self.between.outer[c].clone()), rules, is_guarded)
+        Work::new(
+            self.patch(net, c, rules.unit),
+            self.partition.cells[c],
+            (obstacles, self.between.outer[c].clone()),
+            rules,
+            is_guarded,
+        )
     }
 }
 
@@ -159,7 +166,7 @@ impl Between {
 pub(super) struct Goal {
     /// Triangles of the whole mesh.
     pub(super) triangles: usize,
-    /// How many times as many are left of those that a round may change, if it is not the last one.
+    /// How many times as many are left of those that a round may change, if it is more than one.
     pub(super) margin: f64,
 }
 
@@ -169,8 +176,8 @@ pub(super) struct Round {
     pub(super) became: Vec<u32>,
     /// Cells that had to be done again with a guard.
     pub(super) redone: usize,
-    /// Edges were left alone because of what their quadrics would be.
-    pub(super) is_limited: bool,
+    /// Why edges were left alone.
+    pub(super) barred: Barred,
 }
 
 /// Simplifies by one round.
@@ -194,11 +201,11 @@ pub(super) fn round(net: &mut Net, rules: Rules, planes: Planes, goal: Goal) -> 
             is_crossed
         })
         .collect();
-    let is_limited = works.iter().any(|work| work.is_limited);
+    let barred = works.iter().fold(Barred::default(), |barred, work| barred.or(work.barred));
     let became = merge(net, &parted, &works);
     // To give memory back takes its time, too.
     works.into_par_iter().for_each(drop);
-    Round { became, redone: redone.into_iter().filter(|was| *was).count(), is_limited }
+    Round { became, redone: redone.into_iter().filter(|was| *was).count(), barred }
 }
 
 /// How many triangles of single cells are to be left. Those whose vertices all stay are not counted on.
@@ -209,7 +216,7 @@ fn wanted(net: &Net, parted: &Parted, goal: Goal) -> usize {
     let (own, all) = (parted.faces.len() - staying, net.faces.len() - staying_in_all);
     let left = goal.triangles.saturating_sub(staying_in_all);
     if own == 0 || own == all {
-        return staying + left;
+        return staying + (left as f64 * goal.margin.max(1.0)) as usize;
     }
     let share = own as f64 / all as f64;
     staying + ((left as f64 * share * goal.margin) as usize).max(left.saturating_sub(all - own))

@@ -63,6 +63,33 @@ pub(crate) enum Ended {
     /// No more edge may collapse: for what stays, the topology, the shape of triangles, or what they would cross.
     #[default]
     Edges,
+    /// Some for the one, some for the other.
+    Both,
+}
+
+/// Why edges were left alone.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Barred {
+    /// Because of what their quadrics would be.
+    pub(super) by_distance: bool,
+    /// For any other reason.
+    pub(super) by_rules: bool,
+}
+
+impl Barred {
+    /// For the reasons of both.
+    pub(super) fn or(self, other: Self) -> Self {
+        Self { by_distance: self.by_distance || other.by_distance, by_rules: self.by_rules || other.by_rules }
+    }
+
+    /// Why no more was simplified.
+    pub(super) fn ended(self) -> Ended {
+        match (self.by_distance, self.by_rules) {
+            (true, true) => Ended::Both,
+            (true, false) => Ended::Deviation,
+            (false, _) => Ended::Edges,
+        }
+    }
 }
 
 /// The simplified mesh.

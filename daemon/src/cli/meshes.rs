@@ -126,10 +126,10 @@ pub(crate) struct KeepEdges {
 
 #[derive(Args, Debug)]
 pub(crate) struct SimplifyArgs {
-    /// So many triangles at most
+    /// So many triangles at most, as far as the surface stays within --max-deviation [default: 1 % of the diagonal]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..), group = "wanted")]
     pub triangles: Option<u64>,
-    /// This share of the triangles at most
+    /// This share of the triangles at most, as far as the surface stays within --max-deviation [default: 1 % of the diagonal]
     #[arg(long, value_name = "SHARE", value_parser = parse_share, group = "wanted")]
     pub ratio: Option<f64>,
     /// The surface stays within this distance, both ways, proved; alone, triangles are made as few as it allows; lengths are in the file's units

@@ -19,10 +19,11 @@ pub(super) fn wanted(profile: &Profile, triangles: usize) -> Option<usize> {
 
 /// Why more triangles are left than were wanted.
 pub(super) fn why_not(wanted: usize, ended: Ended, within: Option<f64>) -> String {
+    let farther = if within.is_some() { "farther off than allowed" } else { "farther off than 1 % of the diagonal" };
     let why = match ended {
-        Ended::Edges => "fewer would cross, turn over, or lose an edge of the part",
-        _ if within.is_some() => "fewer would be farther off than allowed",
-        _ => "fewer would be farther off than 1 % of the diagonal",
+        Ended::Edges => "fewer would cross, turn over, or lose an edge of the part".into(),
+        Ended::Both => format!("fewer would be {farther}, cross, turn over, or lose an edge of the part"),
+        _ => format!("fewer would be {farther}"),
     };
     format!("{wanted} triangles were asked for; {why}")
 }

@@ -143,11 +143,12 @@ fn shares(own: &[usize], all: usize, (wanted, is_of_all): (usize, bool)) -> Vec<
     own.iter().map(|own| (*own as u128 * left as u128 / sum.max(1) as u128) as usize).collect()
 }
 
-/// Why a pass ended: for the deviation, if a cell did.
+/// Why a pass ended: for the reasons of both.
 fn later(a: Ended, b: Ended) -> Ended {
     match (a, b) {
-        (Ended::Deviation, _) | (_, Ended::Deviation) => Ended::Deviation,
-        (Ended::Count, other) | (other, _) => other,
+        (Ended::Count, other) | (other, Ended::Count) => other,
+        _ if a == b => a,
+        _ => Ended::Both,
     }
 }
 

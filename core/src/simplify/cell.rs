@@ -24,7 +24,7 @@ pub(super) const LIMITS: usize = 3;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Rules {
     pub(super) shape: legal::Bounds,
-    /// What lengths are multiplied by: a power of two, by which the mesh has about the size 1, so that no quadric is out of the range of f32.
+    /// Lengths are multiplied by this power of two, so that the mesh has about the size 1, and no quadric is out of the range of f32.
     pub(super) unit: f64,
     /// The largest value of a quadric by its weight, without the share for short edges: a squared length in this unit, by how strict a vertex is.
     pub(super) limits: [f64; LIMITS],

@@ -45,7 +45,7 @@ pub(super) struct Course<'a> {
     pub(super) cell: usize,
     /// The cosine of the angle from which on an edge is a feature.
     pub(super) feature: f64,
-    /// What lengths are multiplied by: a power of two.
+    /// Cells multiply lengths by this power of two.
     pub(super) unit: f64,
 }
 

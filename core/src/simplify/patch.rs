@@ -69,7 +69,7 @@ pub(super) struct Patch {
     counts: Vec<u32>,
     /// For each vertex, the square of the least height of the triangles that were there at first, around it and all that have become it.
     lows: Vec<f32>,
-    /// What positions are multiplied by: a power of two, so that nothing is rounded.
+    /// Positions are multiplied by this power of two, so that nothing is rounded.
     unit: f64,
     /// Triangles that are there.
     pub(super) live: usize,
@@ -239,7 +239,7 @@ impl Patch {
             self.corners[corner as usize] = NONE;
             self.counts[wing as usize] -= 1;
             self.live -= 1;
-            // Nobody goes round a vertex of more, whose corners would be gone through for each of them.
+            // A vertex with more triangles has no star, so that its dead corners may stay linked. To unlink each at once would go through all corners each time.
             if self.count(wing) <= MOST {
                 self.unlink(wing);
             }

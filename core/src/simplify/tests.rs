@@ -290,7 +290,7 @@ fn ball(sides: u32, rows: u32) -> (Vec<Point>, Vec<[u32; 3]>) {
     (points, faces)
 }
 
-/// Walls that are a thousandth of their length high become two triangles each, as high as before.
+/// Walls become two triangles each, or nearly, and as high as before, however low they are.
 #[test]
 fn thin_parts_get_fewer_triangles_as_thick_ones_do() {
     for (n, side, height) in [(20, 5.0, 0.001), (20, 5.0, 1e-5), (1, 1000.0, 0.25), (20, 5.0, 5.0)] {

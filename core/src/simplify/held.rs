@@ -20,6 +20,11 @@ impl Held {
         Self { fixed: fixed(input), strict: vec![0; count], attempt: 0, is_raised: vec![false; count] }
     }
 
+    /// All are free again but what may not change, for all is to be done anew.
+    pub(super) fn free(&mut self, input: &Input<'_>) {
+        *self = Self { attempt: self.attempt, ..Self::new(input) };
+    }
+
     /// Less is aimed at for the vertices of triangles that went too far, by as much as they did, and for more around them each time.
     pub(super) fn hold(&mut self, input: &Input<'_>, far: &[(u32, f64)], most: f64) {
         // By how many limits each vertex is judged more strictly; each one is of half the distance of the one before.

@@ -76,7 +76,7 @@ fn in_cells(input: &Input<'_>, options: &Options, cell: usize) -> Result<Outcome
     let bounds = Bounds::of(input.points);
     let most = most(options, &bounds);
     let feature = options.feature_angle.map_or(-2.0, f64::cos);
-    let course = Course { input, options, most, cell, feature, unit: unit(bounds.diagonal()) };
+    let mut course = Course { input, options, most, cell, feature, unit: unit(bounds.diagonal()), aim: 1.0 };
     let mut made = course.first(&held);
     if !options.prove && options.max_deviation.is_none() {
         return Ok(measured(made.outcome(input), input, &bounds));
@@ -84,15 +84,25 @@ fn in_cells(input: &Input<'_>, options: &Options, cell: usize) -> Result<Outcome
     let enough = options.enough.or(options.max_deviation.filter(|most| most.is_finite())).unwrap_or(0.0);
     let mut verdict = proof::prove(&made.pairing(input), most, enough);
     let mut first = None;
-    while verdict.proved.forward.max(verdict.proved.backward) > most {
+    loop {
+        let worst = verdict.proved.forward.max(verdict.proved.backward);
+        if worst <= most {
+            break;
+        }
         held.hold(input, &verdict.far, most);
         if held.attempt > ATTEMPTS {
             return Ok(measured(course.unchanged(held.attempt), input, &bounds));
         }
         let first = first.get_or_insert_with(|| course.net(&held));
-        let next = course.redo(&made, first, &held);
-        verdict = proof::prove_again(&next.pairing(input), &made.changes(&next, input, &verdict), (most, enough));
-        made = next;
+        if let Some(next) = course.redo(&made, first, &held) {
+            verdict = proof::prove_again(&next.pairing(input), &made.changes(&next, input, &verdict), (most, enough));
+            made = next;
+        } else {
+            course.aim_lower(worst);
+            held.free(input);
+            made = course.first(&held);
+            verdict = proof::prove(&made.pairing(input), most, enough);
+        }
     }
     let mut outcome = made.outcome(input);
     outcome.attempts = held.attempt + 1;

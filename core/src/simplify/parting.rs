@@ -20,6 +20,11 @@ use crate::util::ids::NONE;
 /// A triangle flatter than this share of an equilateral one, squared, is none.
 const LEAST_SHAPE: f64 = 1e-12;
 
+/// At most this share of the faces that were simplified away may come back. Where vertices have become others that are far away, the faces between parted
+/// ones and them fold, so that more and more is parted. To do all anew with a lower aim then takes less time, and keeps fewer triangles: a bumpy torus of a
+/// million, within four millionths of its diagonal, takes an eighth of the time and keeps 27 % fewer (measured; with 0.66, some parts keep 10 % more).
+const MOST_BACK: f64 = 0.85;
+
 /// Faces that a thread looks at, at least.
 const BLOCK: usize = 1 << 10;
 
@@ -53,11 +58,16 @@ impl Mesh {
 }
 
 impl Parting<'_> {
-    /// The net with parted vertices, and the vertex of it that each of the input has become. Where it `freezes`, vertices stay that are neither parted nor
-    /// beside such. `fixed`, `strict`: of the input's vertices. O(n), times the few steps until no new triangle is wrong.
-    pub(super) fn net(mut self, fixed: &[bool], strict: &[u8], freezes: bool) -> (Net, Vec<u32>) {
+    /// The net with parted vertices, and the vertex of it that each of the input has become; nothing where too much would come back. Where it `freezes`,
+    /// vertices stay that are neither parted nor beside such. `fixed`, `strict`: of the input's vertices. O(n), times the few steps until no new
+    /// triangle is wrong.
+    pub(super) fn net(mut self, fixed: &[bool], strict: &[u8], freezes: bool) -> Option<(Net, Vec<u32>)> {
+        let away = self.input.faces.len() - self.net.faces.len();
         let mesh = loop {
             let mesh = self.mesh();
+            if (mesh.faces.len() - self.net.faces.len()) as f64 > MOST_BACK * away as f64 {
+                return None;
+            }
             let fresh: Vec<u32> = self.select(&mesh, |corners| corners.contains(&true));
             let mut wrong = self.bent(&mesh);
             if wrong.is_empty() {
@@ -86,7 +96,7 @@ impl Parting<'_> {
             limits.push(strict[home].max(net.strict[at]));
         }
         let Mesh { became, homes, points, faces, origins } = mesh;
-        (Net { points, quadrics, kinds, strict: limits, faces, origins, homes, open: self.first.open.clone() }, became)
+        Some((Net { points, quadrics, kinds, strict: limits, faces, origins, homes, open: self.first.open.clone() }, became))
     }
 
     /// Is a vertex of the mesh one of those that are parted?
@@ -246,7 +256,7 @@ mod tests {
         let input = Input { points: &points, faces: &faces, region: None, fixed: None, within: None };
         let is_parted = (0..net.points.len()).map(|w| w == sunk(15) as usize).collect();
         let parting = Parting { input: &input, first: &first, net: &net, became: &became, is_parted };
-        let (parted, became) = parting.net(&none, &[0; 36], true);
+        let (parted, became) = parting.net(&none, &[0; 36], true).unwrap();
         assert_eq!(parted.points.len(), 35, "one of both is parted");
         assert_eq!(parted.faces.len(), faces.len() - 2);
         let is_same = |v: usize| parted.points[became[v] as usize] == points[v];

@@ -29,6 +29,9 @@ const FIRST_YIELD: f64 = 0.2;
 /// A step looks at so many times as many edges as are to collapse, at most.
 const LEAST_YIELD: f64 = 0.02;
 
+/// A goal is reached if at most one in so many triangles is left besides.
+const NEARLY: usize = 100;
+
 /// A cell, and a place in it.
 #[derive(Clone, Copy, Default)]
 struct Seat {
@@ -178,6 +181,8 @@ pub(super) struct Round {
     pub(super) redone: usize,
     /// Why edges were left alone.
     pub(super) barred: Barred,
+    /// About as many triangles are left in cells as the goal wants, not more.
+    pub(super) is_reached: bool,
 }
 
 /// Simplifies by one round.
@@ -185,7 +190,10 @@ pub(super) fn round(net: &mut Net, rules: Rules, planes: Planes, goal: Goal) -> 
     let parted = Parted::new(net, planes);
     let cells = parted.partition.cells.len();
     let mut works: Vec<Work> = (0..cells).into_par_iter().with_max_len(1).map(|c| parted.work(net, c, rules, false)).collect();
-    advance(&mut works, wanted(net, &parted, goal));
+    let wanted = wanted(net, &parted, goal);
+    advance(&mut works, wanted);
+    let live: usize = works.iter().map(|work| work.patch.live).sum();
+    let is_reached = live <= wanted + wanted / NEARLY;
     let redone: Vec<bool> = works
         .par_iter_mut()
         .enumerate()
@@ -205,7 +213,7 @@ pub(super) fn round(net: &mut Net, rules: Rules, planes: Planes, goal: Goal) -> 
     let became = merge(net, &parted, &works);
     // To give memory back takes its time, too.
     works.into_par_iter().for_each(drop);
-    Round { became, redone: redone.into_iter().filter(|was| *was).count(), barred }
+    Round { became, redone: redone.into_iter().filter(|was| *was).count(), barred, is_reached }
 }
 
 /// How many triangles of single cells are to be left. Those whose vertices all stay are not counted on.

@@ -102,6 +102,33 @@ fn places_that_miss_a_deviation_are_done_again() {
     }
 }
 
+/// Of a smooth surface, as many triangles are left as the reciprocal of the deviation, also where each vertex that is left stands for forty: to do far places
+/// again then parts nearly the whole mesh, each time for others.
+#[test]
+fn coarse_places_that_miss_a_deviation_do_not_make_the_rest_fine() {
+    let (points, faces) = torus(150, 0.3);
+    let left = [0.03, 0.06].map(|d| {
+        let options = Options { max_deviation: Some(d), ..Options::default() };
+        let outcome = simplify(&all(&points, &faces), &options).unwrap();
+        assert!(outcome.attempts > 1 && outcome.attempts < 5, "{}", outcome.attempts);
+        outcome.faces.len()
+    });
+    assert!(left[1] as f64 <= 0.55 * left[0] as f64, "{left:?}");
+}
+
+/// A count that the deviation keeps out of reach changes nothing: quadrics that were made anew for it would not know how far the mesh is already.
+#[test]
+fn a_count_out_of_reach_leaves_as_much_as_the_deviation_alone() {
+    let (points, faces) = torus(60, 0.3);
+    let left = |triangles: Option<usize>, cell: usize| {
+        let options = Options { triangles, max_deviation: Some(0.1), ..Options::default() };
+        in_cells(&all(&points, &faces), &options, cell).unwrap().faces.len()
+    };
+    assert_eq!(left(Some(4), CELL), left(None, CELL));
+    let (with, without) = (left(Some(4), 1200), left(None, 1200));
+    assert!(with * 20 <= without * 21, "{with} {without}");
+}
+
 /// The first round has a margin above the whole, and nothing to do; half of the mesh stays, and is not counted on.
 #[test]
 fn a_count_just_below_the_whole_is_reached() {

@@ -72,7 +72,7 @@ use std::path::Path;
 /// # Errors
 /// [`Error`]; nothing was written in any case.
 pub fn inspect(input: &Path, profile: &Profile, limits: &Limits, progress: &dyn Progress) -> error::Result<Report> {
-    engine::entry::inspect(input, profile, limits, progress)
+    engine::entry::inspect(input, profile, limits, progress).map_err(|error| error.of_work_on(input))
 }
 
 /// Repairs the file `input` into `output`, which must not exist: the caller owns a temporary name and publishes it. (Or it is an empty file
@@ -84,7 +84,7 @@ pub fn inspect(input: &Path, profile: &Profile, limits: &Limits, progress: &dyn 
 /// # Errors
 /// [`Error`]; what then stands at `output` is incomplete and to be removed.
 pub fn repair(input: &Path, output: &Path, profile: &Profile, limits: &Limits, progress: &dyn Progress) -> error::Result<Report> {
-    engine::entry::repair(input, output, profile, limits, progress)
+    engine::entry::repair(input, output, profile, limits, progress).map_err(|error| error.of_work_on(input))
 }
 
 /// Writes the mesh of outlines of curves that were filled (`curves::fill`) to the new file `output`, in this format and in millimetres, of which there are so many in

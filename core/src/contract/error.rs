@@ -60,10 +60,28 @@ pub enum Error {
     Changed { path: PathBuf },
 }
 
+/// Files without a name are reached by paths in this folder.
+pub(crate) const DESCRIPTORS: &str = "/proc/self/fd";
+
 impl Error {
     pub(crate) fn io(path: &Path, action: &'static str) -> impl FnOnce(std::io::Error) -> Self {
         let path = path.to_owned();
         move |source| Self::Io { path, action, source }
+    }
+
+    /// The error of work on `path`: an error at a file without a name is one at that path, since no user has seen the other.
+    pub(crate) fn of_work_on(mut self, path: &Path) -> Self {
+        let (Self::Unreadable { path: own, .. }
+        | Self::Refused { path: own, .. }
+        | Self::Starved { path: own, .. }
+        | Self::Profile { path: own, .. }
+        | Self::NoSpace { path: own, .. }
+        | Self::Io { path: own, .. }
+        | Self::Changed { path: own }) = &mut self;
+        if own.starts_with(DESCRIPTORS) {
+            *own = path.into();
+        }
+        self
     }
 
     /// `progress` has ended the work on `path` during `action`.
@@ -127,5 +145,14 @@ mod tests {
         let class = |errno: Errno| Error::io(&path, "writing")(errno.into()).class();
         assert_eq!([Errno::NOSPC, Errno::DQUOT, Errno::MFILE].map(class), [ErrorClass::Shortage; 3]);
         assert_eq!([Errno::IO, Errno::ACCESS].map(class), [ErrorClass::Environment; 2], "another try may end otherwise");
+    }
+
+    /// A user knows the input, and not the numbers of open files.
+    #[test]
+    fn errors_at_files_without_a_name_are_at_the_input() {
+        let input = Path::new("part.stl");
+        let at = |path: &str| Error::io(Path::new(path), "reading back")(Errno::IO.into()).of_work_on(input).to_string();
+        assert!(at("/proc/self/fd/4").starts_with("part.stl: reading back failed: "));
+        assert!(at("other.stl").starts_with("other.stl: reading back failed: "));
     }
 }

@@ -14,7 +14,7 @@ use std::thread::JoinHandle;
 
 use crossbeam::channel::{Sender, bounded};
 
-use crate::contract::error::{Error, Result};
+use crate::contract::error::{DESCRIPTORS, Error, Result};
 use crate::contract::settings::Limits;
 use crate::io::disk_space::{self, Need};
 use crate::util::parallel;
@@ -103,7 +103,7 @@ impl Nameless {
     }
 
     pub(crate) fn path(&self) -> PathBuf {
-        format!("/proc/self/fd/{}", self.file.as_raw_fd()).into()
+        Path::new(DESCRIPTORS).join(self.file.as_raw_fd().to_string())
     }
 }
 

@@ -178,9 +178,14 @@ impl WideTree {
         bottom: usize,
         visit: &mut impl FnMut(usize) -> bool,
     ) -> bool {
+        let there = if level == 0 { self.order.len() } else { self.levels[level - 1].len() };
         let mut left = lanes(&self.levels[level][node]);
         while left != 0 {
             let below = node * WIDTH + left.trailing_zeros() as usize;
+            // A missing box meets one that has no end, and is around an empty one.
+            if below >= there {
+                break;
+            }
             left &= left - 1;
             let stops = if level > bottom { self.descend((level - 1, below), lanes, bottom, visit) } else { visit(below) };
             if stops {
@@ -188,5 +193,32 @@ impl WideTree {
             }
         }
         false
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Boxes in a row, of which each level of the tree has a node that is not full: a box without an end meets each of them once, and none is around an
+    /// empty one.
+    #[test]
+    fn missing_boxes_are_never_visited() {
+        let endless = Bounds { lo: [f32::NEG_INFINITY; 3], hi: [f32::INFINITY; 3] };
+        for count in [0, 1, 15, 17, 300, 5000] {
+            let boxes: Vec<Bounds> =
+                (0..count).map(|i| Bounds { lo: [i as f32, 0.0, 0.0], hi: [i as f32 + 0.5, 1.0, 1.0] }).collect();
+            let tree = WideTree::new((0..count).collect(), &boxes);
+            let mut met = Vec::new();
+            tree.each_meeting(&endless, |number| met.push(number));
+            met.sort_unstable();
+            assert_eq!(met, (0..count).collect::<Vec<u32>>());
+            assert!(!tree.any_around(&Bounds::EMPTY, |_| true));
+            let mut leaves = Vec::new();
+            assert!(tree.leaves_meeting(&endless, usize::MAX, &mut leaves));
+            let mut met = 0;
+            tree.each_of_leaves(&leaves, &endless, |_| met += 1);
+            assert_eq!(met, count);
+        }
     }
 }

@@ -200,7 +200,7 @@ impl WideTree {
 mod tests {
     use super::*;
 
-    /// Boxes in a row, of which each level of the tree has a node that is not full: a box without an end meets each of them once, and none is around an
+    /// Boxes in a row, of which each level of the tree has a node that is not full: a box without an end meets each of them once, and each is around an
     /// empty one.
     #[test]
     fn missing_boxes_are_never_visited() {
@@ -213,7 +213,12 @@ mod tests {
             tree.each_meeting(&endless, |number| met.push(number));
             met.sort_unstable();
             assert_eq!(met, (0..count).collect::<Vec<u32>>());
-            assert!(!tree.any_around(&Bounds::EMPTY, |_| true));
+            let mut around = 0;
+            tree.any_around(&Bounds::EMPTY, |_| {
+                around += 1;
+                false
+            });
+            assert_eq!(around, count);
             let mut leaves = Vec::new();
             assert!(tree.leaves_meeting(&endless, usize::MAX, &mut leaves));
             let mut met = 0;

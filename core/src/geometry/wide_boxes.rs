@@ -9,7 +9,7 @@ use crate::util::steps;
 /// Boxes of a node.
 const WIDTH: usize = 16;
 
-/// Sixteen boxes; missing ones meet nothing that is finite.
+/// Sixteen boxes. A missing one meets nothing that is finite; whoever goes on below a lane asks first whether its box is there.
 struct Node {
     lo: [[Vec4; WIDTH / 4]; 3],
     hi: [[Vec4; WIDTH / 4]; 3],

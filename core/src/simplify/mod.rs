@@ -41,7 +41,7 @@ const CELL: usize = 12_000;
 /// of reach is not paid for by the shape.
 pub(crate) const MOST_DEVIATION: f64 = 0.01;
 
-/// Times that places which miss the deviation are done again, at most.
+/// Times that places which miss the deviation are done again, or all, at most.
 const ATTEMPTS: usize = 16;
 
 /// Why nothing was simplified.
@@ -62,7 +62,7 @@ pub(crate) enum Error {
 /// Simplifies a mesh. O(n log n), 150 bytes a triangle.
 ///
 /// A deviation that is wanted is kept: where the proof finds more, the vertices there are parted again, less is aimed at, and these places alone are done
-/// and proved anew; in the end nothing is changed.
+/// and proved anew, or all, where that would be nearly everything; in the end nothing is changed.
 ///
 /// # Errors
 /// [`Error`]: the input is no mesh.

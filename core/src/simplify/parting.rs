@@ -62,10 +62,11 @@ impl Parting<'_> {
     /// vertices stay that are neither parted nor beside such. `fixed`, `strict`: of the input's vertices. O(n), times the few steps until no new
     /// triangle is wrong.
     pub(super) fn net(mut self, fixed: &[bool], strict: &[u8], freezes: bool) -> Option<(Net, Vec<u32>)> {
-        let away = self.input.faces.len() - self.net.faces.len();
+        let now = self.net.faces.len();
+        let most = now + (MOST_BACK * (self.input.faces.len() - now) as f64) as usize;
         let mesh = loop {
             let mesh = self.mesh();
-            if (mesh.faces.len() - self.net.faces.len()) as f64 > MOST_BACK * away as f64 {
+            if mesh.faces.len() > most {
                 return None;
             }
             let fresh: Vec<u32> = self.select(&mesh, |corners| corners.contains(&true));

@@ -8,6 +8,7 @@ use std::fs::{File, OpenOptions};
 use std::io::{self, IoSlice, Seek, SeekFrom, Write};
 use std::os::fd::AsFd;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::thread::ScopedJoinHandle;
 
@@ -82,6 +83,21 @@ pub(crate) fn write(
 ) -> Result<Written> {
     let mut sink = Sink::create(mesh, output, limits, progress)?;
     sink.hold(content, limits)?;
+    sink.finish(limits)
+}
+
+/// Makes a file that was written already the copy of a mesh's file instead.
+///
+/// # Errors
+/// [`Error`], any of them.
+pub(crate) fn rewrite(mesh: &MeshFile, written: Written, limits: &Limits, progress: &dyn Progress) -> Result<Written> {
+    let (path, file) = (written.path.clone(), Arc::clone(&written.file));
+    written.durable()?;
+    let failed = || Error::io(&path, "writing");
+    file.set_len(0).map_err(failed())?;
+    (&*file).rewind().map_err(failed())?;
+    let mut sink = Sink::of(file, mesh, &path, limits, progress)?;
+    sink.hold(&Content::Input, limits)?;
     sink.finish(limits)
 }
 
@@ -174,7 +190,7 @@ struct Sink<'a> {
     path: &'a Path,
     /// Copies inside the kernel are not to be had between all file systems.
     kernel_copies: bool,
-    file: File,
+    file: Arc<File>,
     waiting: Vec<Piece<'a>>,
     waiting_bytes: usize,
     /// Bytes that are few, or not the input's.
@@ -190,6 +206,11 @@ struct Sink<'a> {
 impl<'a> Sink<'a> {
     fn create(mesh: &'a MeshFile, path: &'a Path, limits: &Limits, progress: &'a dyn Progress) -> Result<Self> {
         let file = create(path).map_err(Error::io(path, "creating"))?;
+        Self::of(Arc::new(file), mesh, path, limits, progress)
+    }
+
+    /// The empty file at the path.
+    fn of(file: Arc<File>, mesh: &'a MeshFile, path: &'a Path, limits: &Limits, progress: &'a dyn Progress) -> Result<Self> {
         let behind = WriteBehind::new(&file, limits).map_err(Error::io(path, "creating"))?;
         Ok(Self {
             mesh,
@@ -227,7 +248,7 @@ impl<'a> Sink<'a> {
         }
         self.flush()?;
         self.copied = std::mem::take(&mut self.at);
-        self.file.rewind().map_err(|e| self.failed(e))?;
+        (&*self.file).rewind().map_err(|e| self.failed(e))?;
         Ok((self, digest))
     }
 
@@ -273,7 +294,7 @@ impl<'a> Sink<'a> {
                 self.flush()?;
                 self.at += there as u64;
                 bytes = &bytes[there..];
-                self.file.seek(SeekFrom::Start(self.at)).map_err(|e| self.failed(e))?;
+                (&*self.file).seek(SeekFrom::Start(self.at)).map_err(|e| self.failed(e))?;
                 self.tell(self.at);
             }
         }
@@ -313,7 +334,7 @@ impl<'a> Sink<'a> {
                 _ => self.kernel_copies = false,
             }
         }
-        self.file.write_all(bytes)
+        (&*self.file).write_all(bytes)
     }
 
     /// Writes what waits, from where it lies.
@@ -328,7 +349,7 @@ impl<'a> Sink<'a> {
                 IoSlice::new(bytes)
             }
         }));
-        write_all(&mut self.file, &mut pieces).map_err(|e| self.failed(e))?;
+        write_all(&self.file, &mut pieces).map_err(|e| self.failed(e))?;
         let written = std::mem::take(&mut self.waiting_bytes);
         self.waiting.clear();
         self.own.clear();
@@ -359,9 +380,10 @@ impl<'a> Sink<'a> {
         }
         let Self { path, file, behind, .. } = self;
         let deferred = limits.defer_sync;
+        let synced = Arc::clone(&file);
         let sync = move || {
             behind.finish()?;
-            if deferred { Ok(()) } else { file.sync_all() }
+            if deferred { Ok(()) } else { synced.sync_all() }
         };
         let syncing = if limits.threads > 1 && self.mesh.bytes().len() >= SYNCED_BESIDE {
             Some(Aside::start("sync", sync))
@@ -369,11 +391,11 @@ impl<'a> Sink<'a> {
             sync().map_err(Error::io(path, "syncing"))?;
             None
         };
-        Ok(Written { path: path.into(), syncing })
+        Ok(Written { path: path.into(), file, syncing })
     }
 }
 
-fn write_all(file: &mut File, mut pieces: &mut [IoSlice<'_>]) -> io::Result<()> {
+fn write_all(mut file: &File, mut pieces: &mut [IoSlice<'_>]) -> io::Result<()> {
     // There may be nothing, and pieces of no bytes.
     IoSlice::advance_slices(&mut pieces, 0);
     while !pieces.is_empty() {
@@ -394,6 +416,7 @@ const SYNCED_BESIDE: usize = 8 << 20;
 #[must_use]
 pub(crate) struct Written {
     path: PathBuf,
+    file: Arc<File>,
     syncing: Option<Aside<io::Result<()>>>,
 }
 

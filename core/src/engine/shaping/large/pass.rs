@@ -1,4 +1,5 @@
-//! One pass: cells, some at a time, each simplified by itself; what they leave follows on a new spool.
+//! One pass: cells, some at a time, each simplified by itself; what they leave follows on a new spool. Meanwhile the next ones are read, and those before
+//! are written.
 
 use std::ops::Range;
 use std::path::Path;
@@ -6,7 +7,7 @@ use std::path::Path;
 use rayon::prelude::*;
 
 use super::super::simplifying::BYTES_A_TRIANGLE;
-use super::cell::Made;
+use super::cell::{Cell, Made};
 use super::cells::{Cells, Parting, Stop};
 use super::strips::BLOCK;
 use crate::contract::error::{Error, Result as Failing};
@@ -17,8 +18,11 @@ use crate::simplify::{Ended, Options};
 use crate::stream::plan::Plan;
 use crate::util::{bits, parallel};
 
-/// So many cells for each thread at a time: some are done sooner than others.
-const CELLS_A_THREAD: usize = 2;
+/// The triangles of so many cells for each thread at a time: some are done sooner than others.
+const CELLS_A_THREAD: u64 = 2;
+
+/// Memory for each triangle of the cells that are read meanwhile, and of those before.
+const BYTES_BESIDE: u64 = 96;
 
 /// A pass that is to be made.
 pub(super) struct Pass<'a> {
@@ -53,6 +57,31 @@ pub(super) struct Passed {
     pub(super) plan: Option<Plan>,
 }
 
+/// What was taken from cells so far.
+#[derive(Default)]
+struct Taken {
+    stays: Vec<u64>,
+    proved: [f64; 2],
+    volume: f64,
+    ended: Ended,
+    missed: usize,
+}
+
+impl Taken {
+    /// Takes from cells, in their order, what came of them.
+    fn take(&mut self, all: Vec<Made>, append: &mut dyn FnMut(&[Record]) -> Failing<()>) -> Failing<()> {
+        for made in all {
+            append(&made.added)?;
+            made.gone.iter().for_each(|number| bits::take(&mut self.stays, *number as usize));
+            self.proved = [0, 1].map(|k| self.proved[k].max(made.proved[k]));
+            self.volume += made.volume;
+            self.ended = later(self.ended, made.ended);
+            self.missed += made.missed;
+        }
+        Ok(())
+    }
+}
+
 impl Pass<'_> {
     pub(super) fn run(&self) -> Result<Passed, Stop> {
         let progress = self.work.progress;
@@ -60,25 +89,28 @@ impl Pass<'_> {
         // How many own triangles are to be left in each, if a count is wanted.
         let left = self.wanted.map(|wanted| shares(&cells.own(), self.records.len(), (wanted, self.is_of_all)));
         let batches = self.batches(&cells)?;
-        let mut stays = bits::all(self.records.len());
-        let (mut proved, mut volume, mut ended, mut missed) = ([0.0_f64; 2], 0.0, Ended::Count, 0);
+        let mut taken = Taken { stays: bits::all(self.records.len()), ended: Ended::Count, ..Taken::default() };
         let spool = nameless_stl::filled(self.path, self.records.len(), self.work, |append| {
-            for batch in batches {
+            let mut read = batches.first().map(|batch| cells.read(batch)).unwrap_or_default();
+            let mut made = Vec::new();
+            for (number, batch) in (1..).zip(&batches) {
                 progress.at("simplify", u64::from(batch.start), cells.len() as u64);
                 if progress.cancelled() {
                     return Err(Error::cancelled(self.path, "simplify"));
                 }
-                for made in self.simplified(&cells, left.as_deref(), &batch) {
-                    append(&made.added)?;
-                    made.gone.iter().for_each(|number| bits::take(&mut stays, *number as usize));
-                    proved = [0, 1].map(|k| proved[k].max(made.proved[k]));
-                    volume += made.volume;
-                    ended = later(ended, made.ended);
-                    missed += made.missed;
-                }
+                let (current, before) = (std::mem::take(&mut read), std::mem::take(&mut made));
+                let beside = || {
+                    taken.take(before, append)?;
+                    Ok(batches.get(number).map(|batch| cells.read(batch)).unwrap_or_default())
+                };
+                let (next, new) =
+                    parallel::both(self.work.limits.threads, beside, || self.simplified(current, left.as_deref(), batch));
+                (read, made) = (next?, new);
             }
-            self.append_what_stays(&stays, append)
+            taken.take(made, append)?;
+            self.append_what_stays(&taken.stays, append)
         })?;
+        let Taken { stays, proved, volume, ended, missed } = taken;
         Ok(Passed { spool, stays, proved, volume, ended, missed, plan: cells.into_plan() })
     }
 
@@ -87,16 +119,18 @@ impl Pass<'_> {
         let limits = self.work.limits;
         let held = cells.heap_bytes() + self.records.len() as u64 / 4;
         let room = limits.memory_bytes.saturating_sub(held);
-        let most = limits.threads.max(1) * CELLS_A_THREAD;
+        let bytes_a_triangle = BYTES_A_TRIANGLE + if cells.len() > 1 { BYTES_BESIDE } else { 0 };
+        let (Parting::Shifted(cell, _) | Parting::Strips(cell, _)) = self.parting;
+        let most = (limits.threads.max(1) as u64 * CELLS_A_THREAD * u64::from(cell)).saturating_mul(bytes_a_triangle).min(room);
         let (mut batches, mut sum): (Vec<Range<u32>>, u64) = (Vec::new(), 0);
         for cell in 0..cells.len() as u32 {
-            let bytes = cells.count(cell) * BYTES_A_TRIANGLE;
+            let bytes = cells.count(cell) * bytes_a_triangle;
             if bytes > room {
                 let [needed, given] = [held + bytes, limits.memory_bytes].map(|bytes| bytes.div_ceil(1 << 20));
                 let why = format!("it takes {needed} MiB of memory for the triangles of a part, and {given} MiB may be used");
                 return Err(Stop::Refused(why));
             }
-            match batches.last_mut().filter(|batch| sum + bytes <= room && batch.len() < most) {
+            match batches.last_mut().filter(|_| sum + bytes <= most) {
                 Some(batch) => (batch.end, sum) = (cell + 1, sum + bytes),
                 None => {
                     batches.push(cell..cell + 1);
@@ -107,8 +141,8 @@ impl Pass<'_> {
         Ok(batches)
     }
 
-    /// Simplifies some cells; in their order.
-    fn simplified(&self, cells: &Cells<'_>, left: Option<&[usize]>, batch: &Range<u32>) -> Vec<Made> {
+    /// Simplifies the cells of a batch; in their order.
+    fn simplified(&self, all: Vec<Cell<'_>>, left: Option<&[usize]>, batch: &Range<u32>) -> Vec<Made> {
         let Work { profile, limits, .. } = self.work;
         let options = Options {
             max_deviation: Some(self.most),
@@ -116,7 +150,6 @@ impl Pass<'_> {
             enough: Some(self.enough),
             ..Options::default()
         };
-        let all = cells.read(batch);
         let left = |at: usize| left.and_then(|left| left.get(batch.start as usize + at)).copied();
         parallel::in_pool(limits.threads, || {
             let each = all.into_par_iter().enumerate().with_max_len(1);

@@ -90,7 +90,7 @@ impl Map<'_> {
         } else if let Some((lone, pairs)) = self.over_edge(face, &[a, b, c]) {
             self.in_two([a, b, c], (lone, pairs), f as u32, found);
         } else {
-            self.across(f as u32, (face, [a, b, c]), lent, found);
+            self.across(f as u32, (face, &[a, b, c]), lent, found);
         }
     }
 
@@ -139,7 +139,7 @@ impl Map<'_> {
     }
 
     /// Maps a triangle that does not go into one face.
-    fn across(&self, f: u32, of: ([u32; 3], [(Spot, f64); 3]), lent: &mut Scratch, found: &mut Found) {
+    fn across(&self, f: u32, of: ([u32; 3], &[(Spot, f64); 3]), lent: &mut Scratch, found: &mut Found) {
         let Scratch { pieces, spots, .. } = lent;
         pieces.clear();
         spots.clear();
@@ -194,18 +194,20 @@ impl Map<'_> {
     }
 
     /// Cuts a triangle that does not go into one face into pieces, in `lent`; returns how far its farthest corner or cut goes, if it can be mapped.
-    fn cut(&self, (face, spots): ([u32; 3], [(Spot, f64); 3]), lent: &mut Scratch, found: &mut Found) -> Option<f64> {
+    fn cut(&self, (face, spots): ([u32; 3], &[(Spot, f64); 3]), lent: &mut Scratch, found: &mut Found) -> Option<f64> {
         let Scratch { chain, ways, lists, pieces, spots: all } = lent;
         let rim = &mut lists.rim;
         rim.clear();
-        for (k, (from, to, turned)) in sides(self.pairing, face, spots).into_iter().enumerate() {
-            rim.push(if turned { to } else { from });
+        let corners = corners(self.pairing, face, spots);
+        for k in 0..3 {
+            rim.push(corners[k]);
             let start = rim.len();
-            let [v, w] = [face[k], face[(k + 1) % 3]];
-            let (ends, is_rim) = ([v.min(w), v.max(w)], self.rim.has(v, w));
+            let (side, turned) = side_of(face, k);
+            let ends = side.map(|k| face[k]);
+            let is_rim = self.rim.has(ends[0], ends[1]);
             if let Some(pairs) = ways.of(ends) {
                 rim.extend_from_slice(pairs);
-            } else if !self.side(([&from, &to], is_rim), chain, rim, &mut found.rims) {
+            } else if !self.side((side.map(|k| &corners[k]), is_rim), chain, rim, &mut found.rims) {
                 return None;
             } else if !is_rim {
                 // Of the rim there is no triangle beyond.
@@ -227,12 +229,14 @@ impl Map<'_> {
     }
 
     /// The faces in which the sides of a triangle run.
-    fn rims(&self, (face, spots): ([u32; 3], [(Spot, f64); 3]), lent: &mut Lent, out: &mut Vec<u32>) {
-        for (from, to, _) in sides(self.pairing, face, spots) {
+    fn rims(&self, (face, spots): ([u32; 3], &[(Spot, f64); 3]), lent: &mut Lent, out: &mut Vec<u32>) {
+        let corners = corners(self.pairing, face, spots);
+        for k in 0..3 {
+            let ends = side_of(face, k).0.map(|k| &corners[k]);
             let mut between = Vec::new();
             // Where there is no way, the triangle beyond fails as well, and no rim runs there.
-            if chain::between(self.surface, [&from, &to], self.aim, lent, &mut between) {
-                out.extend(self.faces_along([&from, &to], &between));
+            if chain::between(self.surface, ends, self.aim, lent, &mut between) {
+                out.extend(self.faces_along(ends, &between));
             }
         }
     }
@@ -256,11 +260,15 @@ fn add(surface: &Surface<'_>, covered: &[AtomicI64], face: u32, spots: &[Spot]) 
     covered[face as usize].fetch_add((sum * UNIT) as i64, Ordering::Relaxed);
 }
 
-/// The ends of the sides of a triangle, with the smaller vertex first, and whether that turns them round.
-fn sides(pairing: &Pairing<'_>, face: [u32; 3], spots: [(Spot, f64); 3]) -> [(Pair, Pair, bool); 3] {
-    let pair = |k: usize| Pair { place: place(pairing.points[face[k % 3] as usize]), spot: spots[k % 3].0, off: spots[k % 3].1 };
-    [0, 1, 2].map(|k| {
-        let turned = face[k] > face[(k + 1) % 3];
-        if turned { (pair(k + 1), pair(k), true) } else { (pair(k), pair(k + 1), false) }
-    })
+/// The corners of a triangle, and their images. They are of some size: sides name them by their numbers.
+#[inline]
+fn corners(pairing: &Pairing<'_>, face: [u32; 3], spots: &[(Spot, f64); 3]) -> [Pair; 3] {
+    [0, 1, 2].map(|k: usize| Pair { place: place(pairing.points[face[k] as usize]), spot: spots[k].0, off: spots[k].1 })
+}
+
+/// The ends of a side of a triangle, with the smaller vertex first, and whether that turns them round.
+#[inline]
+fn side_of(face: [u32; 3], k: usize) -> ([usize; 2], bool) {
+    let next = (k + 1) % 3;
+    if face[k] > face[next] { ([next, k], true) } else { ([k, next], false) }
 }

@@ -26,12 +26,13 @@ impl Quadric {
     /// Of planes through the vertex, by their unit normals.
     pub(super) fn of_normals(normals: impl Iterator<Item = DVec3>) -> Self {
         let mut a = [0.0; 6];
-        for n in normals {
+        // Chains of iterators go faster so than by a loop.
+        normals.for_each(|n| {
             let products = [n.x * n.x, n.x * n.y, n.x * n.z, n.y * n.y, n.y * n.z, n.z * n.z];
             for (sum, product) in a.iter_mut().zip(products) {
                 *sum += product;
             }
-        }
+        });
         Self { a: a.map(|x| x as f32), b: [0.0; 3], c: 0.0 }
     }
 

@@ -31,6 +31,24 @@ impl Cutter {
         if out > 0.0 && below > 0.0 { out.hypot(below) - self.corner } else { out.max(below) - self.corner }
     }
 
+    /// The direction in which [`Cutter::distance`] grows most.
+    pub(super) fn gradient(&self, p: Vector) -> Vector {
+        let far = p[0].hypot(p[1]);
+        let (out, below) = (far - (self.radius - self.corner), self.corner - p[2]);
+        let [radial, axial] = match (out > 0.0 && below > 0.0, out > below) {
+            (true, _) => [out / out.hypot(below), -below / out.hypot(below)],
+            (false, true) => [1.0, 0.0],
+            (false, false) => [0.0, -1.0],
+        };
+        if far > 0.0 { [radial * p[0] / far, radial * p[1] / far, axial] } else { [0.0, 0.0, axial] }
+    }
+
+    /// The height of the tool's lower side over its tip, so far from the axis; infinite beyond the tool.
+    pub(super) fn rise(&self, far: f64) -> f64 {
+        let out = (far - (self.radius - self.corner)).max(0.0);
+        if out <= self.corner { self.corner - (self.corner * self.corner - out * out).sqrt() } else { f64::INFINITY }
+    }
+
     /// The tip of the tool that touches a surface at a point with this unit normal.
     pub(super) fn tip(&self, (point, normal): (Vector, Vector)) -> Vector {
         let level = normal[0].hypot(normal[1]);

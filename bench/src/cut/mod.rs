@@ -11,6 +11,7 @@ mod close;
 mod cutter;
 mod judge;
 mod lattice;
+mod lift;
 mod part;
 mod pass;
 mod program;

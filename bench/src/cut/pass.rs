@@ -1,7 +1,7 @@
 //! The volume that a tool sweeps along a pass, as signed distance.
 
 use super::cutter::Cutter;
-use crate::space::{Vector, minus, plus, times};
+use crate::space::{Vector, dot, minus, plus, times};
 
 /// The golden section: a search keeps so much of its interval at each step.
 const GOLDEN: f64 = 0.618_033_988_75;
@@ -12,32 +12,55 @@ pub(super) enum Pass {
     Arc { radius: f64, z: f64, angles: [f64; 2] },
 }
 
-/// The least distance of a point from a tool on a straight move.
-fn over(cutter: Cutter, from: Vector, to: Vector, p: Vector) -> f64 {
+/// The least distance of a point from a tool on a straight move, at whose ends it is known; or `most`, if that is less. The distance is
+/// convex along the move.
+fn over(cutter: Cutter, [from, to]: [Vector; 2], ends: [f64; 2], p: Vector, most: f64) -> f64 {
+    let least = most.min(ends[0]).min(ends[1]);
     let way = minus(to, from);
     let at = |t: f64| cutter.distance(minus(p, plus(from, times(way, t))));
     if way[2] == 0.0 {
         // The distance grows with that from the axis, which is least beside the point.
         let t = ((p[0] - from[0]) * way[0] + (p[1] - from[1]) * way[1]) / (way[0] * way[0] + way[1] * way[1]);
-        return at(t.clamp(0.0, 1.0));
+        return least.min(at(t.clamp(0.0, 1.0)));
     }
-    // The distance is convex along the move.
+    let [falls, rises] = [from, to].map(|tip| -dot(cutter.gradient(minus(p, tip)), way));
+    // Between the ends the distance is less than there only if it falls at first and rises at last, and it is no less than where both
+    // tangents meet.
+    if falls >= 0.0 || rises <= 0.0 || ends[0] + falls * (ends[1] - ends[0] - rises) / (falls - rises) >= least {
+        return least;
+    }
     let (mut low, mut high) = (0.0, 1.0);
     for _ in 0..30 {
         let (a, b) = (high - GOLDEN * (high - low), low + GOLDEN * (high - low));
         if at(a) < at(b) { high = b } else { low = a }
     }
-    at(0.5 * (low + high)).min(at(0.0)).min(at(1.0))
+    least.min(at(0.5 * (low + high)))
+}
+
+/// The least distance of a point from a tool that goes from place to place; infinite if all places are farther off along Y than the tool
+/// reaches. Each move is asked: a tool with a flat end may be as near on several of them.
+fn along(points: &[Vector], cutter: Cutter, p: Vector) -> f64 {
+    let is_near = |tip: &Vector| points.len() < 3 || (tip[1] - p[1]).abs() < cutter.radius;
+    let mut last: Option<(Vector, f64)> = None;
+    let mut least = f64::INFINITY;
+    for tip in points {
+        let here = if is_near(tip) { Some((*tip, cutter.distance(minus(p, *tip)))) } else { None };
+        if let Some((_, distance)) = here {
+            least = least.min(distance);
+        }
+        if let (Some((from, before)), Some((to, behind))) = (last, here) {
+            least = over(cutter, [from, to], [before, behind], p, least);
+        }
+        last = here;
+    }
+    least
 }
 
 impl Pass {
     /// Signed distance of a point from the swept volume, negative inside; infinite from straight moves that are far from beside it.
     pub(super) fn distance(&self, cutter: Cutter, p: Vector) -> f64 {
         match self {
-            Self::Lines(points) => {
-                let Some((best, least)) = nearest(points, cutter, p) else { return f64::INFINITY };
-                beside(points, best).map(|[from, to]| over(cutter, from, to, p)).fold(least, f64::min)
-            }
+            Self::Lines(points) => along(points, cutter, p),
             Self::Arc { radius, z, angles } => {
                 let angle = p[1].atan2(p[0]).clamp(angles[0], angles[1]);
                 cutter.distance(minus(p, [radius * angle.cos(), radius * angle.sin(), *z]))
@@ -45,22 +68,11 @@ impl Pass {
         }
     }
 
-    /// Whether a point is inside the swept volume or on it.
-    fn holds(&self, cutter: Cutter, p: Vector) -> bool {
-        match self {
-            Self::Lines(points) => {
-                let Some((best, least)) = nearest(points, cutter, p) else { return false };
-                least <= 0.0 || beside(points, best).any(|[from, to]| over(cutter, from, to, p) <= 0.0)
-            }
-            Self::Arc { .. } => self.distance(cutter, p) <= 0.0,
-        }
-    }
-
     /// Where a ray from a point along a unit normal enters the volume, between two heights; the upper one if it does not.
     pub(super) fn entry(&self, cutter: Cutter, (point, normal): (Vector, Vector), range: [f64; 2]) -> f64 {
         let lifted = |height: f64| plus(point, times(normal, height));
         let at = |height: f64| self.distance(cutter, lifted(height));
-        let holds = |height: f64| self.holds(cutter, lifted(height));
+        let holds = |height: f64| self.distance(cutter, lifted(height)) <= 0.0;
         let [mut low, mut high] = range;
         if holds(low) {
             return low;
@@ -82,22 +94,6 @@ impl Pass {
         }
         high
     }
-}
-
-/// The corner of a path at which the tool is nearest to a point, and the distance there. The nearest place of the whole path lies on a
-/// move beside it, as the path bends by little.
-fn nearest(points: &[Vector], cutter: Cutter, p: Vector) -> Option<(usize, f64)> {
-    points
-        .iter()
-        .enumerate()
-        .filter(|(_, tip)| points.len() < 3 || (tip[1] - p[1]).abs() < 0.6 * cutter.radius)
-        .map(|(n, tip)| (n, cutter.distance(minus(p, *tip))))
-        .min_by(|a, b| a.1.total_cmp(&b.1))
-}
-
-/// The moves that begin or end at this corner of a path.
-fn beside(points: &[Vector], corner: usize) -> impl Iterator<Item = [Vector; 2]> {
-    points.array_windows().copied().skip(corner.saturating_sub(1)).take(if corner == 0 { 1 } else { 2 })
 }
 
 #[cfg(test)]

@@ -3,6 +3,7 @@
 use std::fmt::Write;
 
 use super::case::Case;
+use super::lift::lifted;
 use super::pass::Pass;
 use super::surface::Surface;
 use crate::space::Vector;
@@ -12,6 +13,9 @@ const CLEAR: f64 = 100.0;
 
 /// The length of moves that follow a free form.
 const MOVE: f64 = 0.25;
+
+/// The length of a move of the tip, at most: where the surface turns, the tip goes around the point that it touches, and farther than that.
+const LONGEST: f64 = 2.0 * MOVE;
 
 /// More moves than any pass has: even a length without end gives an end.
 const MOST_MOVES: f64 = 1e5;
@@ -25,7 +29,8 @@ pub(super) fn passes(case: &Case) -> Vec<Pass> {
             Surface::Plane(_) => Pass::Lines(vec![tip(u, 0.0), tip(u, case.length)]),
             Surface::Free(..) => {
                 let count = (case.length / MOVE).ceil().clamp(1.0, MOST_MOVES);
-                Pass::Lines((0..=count as usize).map(|j| tip(u, case.length * j as f64 / count)).collect())
+                let tips: Vec<Vector> = (0..=count as usize).map(|j| tip(u, case.length * j as f64 / count)).collect();
+                Pass::Lines(lifted(case.cutter, case.surface, &tips, LONGEST))
             }
             Surface::Cone(radius, _) => {
                 let tip = tip(u, 0.0);

@@ -83,6 +83,11 @@ impl Surface {
         }
     }
 
+    /// The height over a place of the level plane; `None` of planes and cones, which may be steep.
+    pub(super) fn above(&self, x: f64, y: f64) -> Option<f64> {
+        if let Self::Free(..) = self { Some(self.at(x, y).0[2]) } else { None }
+    }
+
     /// The point that stands over these parameters by so much along the normal.
     pub(super) fn lifted(&self, u: f64, v: f64, height: f64) -> Vector {
         let (point, normal) = self.at(u, v);

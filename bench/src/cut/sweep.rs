@@ -8,9 +8,6 @@ use crate::space::{Vector, plus, times};
 /// A place of the upper side: its point, and its height over the intended surface in millimetres.
 pub(super) type Top = (Vector, f64);
 
-/// A pass this many steps away cuts nothing that nearer passes left.
-const FAR: f64 = 2.5;
-
 /// More than rounding does to a distance, in millimetres.
 const SLACK: f64 = 1e-6;
 
@@ -97,8 +94,7 @@ impl<'a> Sweep<'a> {
     fn height(&self, u: f64, v: f64) -> f64 {
         let (case, ray) = (self.case, self.case.surface.at(u, v));
         let far = |k: usize| (k as f64 - u / case.step).abs();
-        let is_outer = |k: usize| (k == 0 && u < 0.0) || (k == case.strips() && u > case.width());
-        let mut near: Vec<usize> = (0..self.passes.len()).filter(|k| far(*k) < FAR || is_outer(*k)).collect();
+        let mut near: Vec<usize> = (0..self.passes.len()).collect();
         near.sort_by(|a, b| far(*a).total_cmp(&far(*b)));
         // Links cut at the passes' ends alone.
         let reach = 1.2 * case.cutter.radius;

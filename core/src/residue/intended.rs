@@ -232,7 +232,7 @@ impl Neighbours {
         };
         let step = self.near.get(side).copied().flatten()?;
         let curve = Curve::new(step, self.near[1 - side], self.far[side])?;
-        let (at, height, normal) = curve.foot(view, from_centre, self.gradient)?;
+        let (at, own, normal) = curve.foot(view, from_centre, self.gradient)?;
         let length = plain_norm(step);
         let radius = view.family.profile.radius;
         let is_contact = at < CONTACT;
@@ -248,10 +248,12 @@ impl Neighbours {
             return Some(Verdict { is_border: true, target: point, height: 0.0, step: length, rise: 0.0 });
         }
         let most = height_most(&view.family.profile, step, view.axis) + plain_norm(sub(curve.point(0.5), scale(step, 0.5)));
-        let is_high = height > 1.2 * most.min(limits.height_max) + limits.tolerance || height < -limits.tolerance;
+        let is_high = own > 1.2 * most.min(limits.height_max) + limits.tolerance || own < -limits.tolerance;
         if is_high || self.distance.abs() > limits.tolerance + 0.5 * most {
             return None;
         }
+        let height = curve.flatter(normal).and_then(|flatter| flatter.foot(view, from_centre, self.gradient));
+        let height = height.map_or(own, |(_, height, _)| own.min(height.max(0.0)));
         let rise = (dot(step, view.axis) / length).abs();
         let is_border = is_end || (is_contact && is_last);
         Some(Verdict { is_border, target: add(point, scale(normal, height)), height, step: length, rise })
@@ -282,6 +284,8 @@ struct Curve {
     step: Point,
     /// Bends at both ends; the curve is `t·step + t·(t − 1)·bend`.
     bends: [Point; 2],
+    /// For each bend, how far it is believed where it leads into the part, between 0 and 1.
+    trusts: [f64; 2],
 }
 
 impl Curve {
@@ -297,18 +301,24 @@ impl Curve {
         // Second divided differences over the lengths of chords.
         let first = before.filter(|before| cosine(*before, step) < -SMOOTH).map(|before| {
             let at = plain_norm(before) / length;
-            scale(add(step, scale(before, 1.0 / at)), 1.0 / (1.0 + at))
+            (scale(add(step, scale(before, 1.0 / at)), 1.0 / (1.0 + at)), trust(at))
         });
         let second = behind.map(|behind| sub(behind, step)).filter(|beyond| cosine(*beyond, step) > SMOOTH).map(|beyond| {
             let at = plain_norm(beyond) / length;
-            scale(sub(scale(beyond, 1.0 / at), step), 1.0 / (1.0 + at))
+            (scale(sub(scale(beyond, 1.0 / at), step), 1.0 / (1.0 + at)), trust(at))
         });
-        let bends = match (first, second) {
-            (Some(first), Some(second)) => [first, second],
-            (Some(one), None) | (None, Some(one)) => [one, one],
-            (None, None) => [[0.0; 3]; 2],
-        };
-        Some(Self { step, bends })
+        let straight = ([0.0; 3], 1.0);
+        let [first, second] = [first.or(second).unwrap_or(straight), second.or(first).unwrap_or(straight)];
+        Some(Self { step, bends: [first.0, second.0], trusts: [first.1, second.1] })
+    }
+
+    /// The curve that goes into the part, in the direction `down`, no farther than its bends are believed; `None` if it does so itself.
+    fn flatter(&self, down: Point) -> Option<Self> {
+        let mut flatter = Self { trusts: [1.0; 2], ..*self };
+        for (bend, trust) in flatter.bends.iter_mut().zip(self.trusts).filter(|(bend, _)| dot(**bend, down) < 0.0) {
+            *bend = scale(*bend, trust);
+        }
+        (flatter.bends != self.bends).then_some(flatter)
     }
 
     fn point(&self, at: f64) -> Point {
@@ -362,6 +372,12 @@ impl Curve {
         }
         Some(found)
     }
+}
+
+/// How far a bend is believed that was measured beside a step, over a way of this part of its length. A short way tells the slope at one
+/// end, and nothing of how it goes on: a parabola through such places leads deeper than all of them.
+fn trust(part: f64) -> f64 {
+    (2.0 * part - 0.5).clamp(0.0, 1.0)
 }
 
 /// Steps of the search for a foot, at most; a handful is usual.

@@ -84,6 +84,29 @@ fn the_floor_is_flat_again() {
     assert!((repaired.displacement - (3.0 - 8.75f64.sqrt())).abs() < 1e-5);
 }
 
+/// A floor meets a slope of 1 in 10, and passes are far apart on the floor and near on the slope: what lies between two passes is not
+/// believed to be deeper than both of them, whatever the slope beside them is.
+#[test]
+fn uneven_passes_make_no_hollow() {
+    let (floor, slope) = ((0..5).map(|k| 1.1 * f64::from(k) - 4.4), (1..12).map(|k| 0.15 * f64::from(k)));
+    let passes: Vec<[f64; 2]> = floor.map(|x| [x, 0.0]).chain(slope.map(|x| [x, 0.1 * x])).collect();
+    let moves = cuts(&passes.iter().map(|[x, z]| [[*x, 0.0, *z], [*x, 10.0, *z]]).collect::<Vec<_>>());
+    // The lower side of a tool with a radius of 2 and a corner of 1.
+    let rise = |far: f64| if far < 2.0 { 1.0 - (1.0 - (far - 1.0).max(0.0).powi(2)).sqrt() } else { f64::INFINITY };
+    let (columns, rows) = (61, 11);
+    let mut points = Vec::new();
+    for (j, i) in (0..rows).flat_map(|j| (0..columns).map(move |i| (j, i))) {
+        let (x, y) = (f64::from(i) * 0.1 - 4.4, f64::from(j));
+        let z = passes.iter().map(|[at, z]| z + rise((x - at).abs())).fold(f64::INFINITY, f64::min);
+        points.push([x, y, z].map(|x| x as f32));
+    }
+    let cuts = Cuts::new(&moves, &[Tool::new(1, Shape::BullNose { corner: 1.0 }, 4.0)], &|| true).expect("cuts");
+    let found = find(Mesh { points: &points, faces: &[] }, &cuts, &Options::default()).expect("a search");
+    let known: Vec<f32> = found.targets.iter().map(|target| target[2]).filter(|z| z.is_finite()).collect();
+    let least = known.iter().copied().fold(f32::INFINITY, f32::min);
+    assert!(known.len() > points.len() / 2 && least > -0.001, "{} of {}, {least}", known.len(), points.len());
+}
+
 /// A flat tool leaves nothing on a floor, and what a ball left there is not its work.
 #[test]
 fn a_flat_tool_leaves_no_ripples() {

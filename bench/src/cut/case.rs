@@ -5,8 +5,8 @@ use super::surface::Surface;
 
 /// A part to be made. Lengths are in millimetres.
 ///
-/// Passes bend by little, and the first and the last row of the part's border are nearly straight seen from above: waves of a free form
-/// are far longer than the step and lower than the tool's radius. A tool whose flat end does not fit the surface's hollows cuts below it.
+/// The first and the last row of the part's border are nearly straight seen from above: waves of a free form are far longer than the step
+/// and lower than the tool's radius. A tool whose flat end does not fit the surface's hollows is lifted there, and leaves more.
 /// Fewer than two passes count as two, and an odd number of cells as the next even one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Case {

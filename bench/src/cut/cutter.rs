@@ -85,6 +85,31 @@ mod tests {
     }
 
     #[test]
+    fn gradients_are_those_of_the_distance() {
+        for (radius, corner) in [(3.0, 3.0), (3.0, 0.0), (3.0, 1.0)] {
+            let cutter = Cutter { radius, corner };
+            for p in [[0.5, 0.2, -1.0], [2.6, 1.9, 0.3], [2.4, 2.2, 2.9], [-1.0, 2.0, 0.1], [-4.0, 1.0, 5.0]] {
+                let gradient = cutter.gradient(p);
+                for axis in 0..3 {
+                    let aside = |by: f64| cutter.distance(std::array::from_fn(|n| p[n] + if n == axis { by } else { 0.0 }));
+                    assert!((aside(1e-6) - aside(-1e-6) - 2e-6 * gradient[axis]).abs() < 1e-11, "{cutter:?} {p:?}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_lower_side_is_where_the_distance_is_nothing() {
+        for (radius, corner) in [(3.0, 3.0), (3.0, 0.0), (3.0, 1.0)] {
+            let cutter = Cutter { radius, corner };
+            for far in [0.0, 1.0, 1.9, 2.5, 2.99] {
+                assert!(cutter.distance([far, 0.0, cutter.rise(far)]).abs() < 1e-12, "{cutter:?} {far}");
+            }
+            assert_eq!(cutter.rise(3.01), f64::INFINITY);
+        }
+    }
+
+    #[test]
     fn the_tip_puts_the_tool_on_the_point() {
         for (radius, corner) in [(3.0, 3.0), (3.0, 0.0), (3.0, 1.0)] {
             let cutter = Cutter { radius, corner };

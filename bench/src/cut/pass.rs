@@ -57,7 +57,7 @@ fn along(points: &[Vector], cutter: Cutter, p: Vector) -> f64 {
 }
 
 impl Pass {
-    /// Signed distance of a point from the swept volume, negative inside; infinite from straight moves that are far from beside it.
+    /// Signed distance of a point from the swept volume, negative inside; infinite from moves that are all farther off along Y than the tool reaches.
     pub(super) fn distance(&self, cutter: Cutter, p: Vector) -> f64 {
         match self {
             Self::Lines(points) => along(points, cutter, p),
@@ -125,5 +125,31 @@ mod tests {
         assert!((pass.entry(BALL, ray, [-0.1, 0.5]) - (3.0 - 8f64.sqrt())).abs() < 1e-9);
         assert_eq!(pass.entry(BALL, ray, [-0.1, 0.1]), 0.1, "it enters higher");
         assert_eq!(pass.entry(BALL, ray, [0.2, 0.5]), 0.2, "it begins inside");
+    }
+
+    #[test]
+    fn all_places_under_the_tool_are_asked() {
+        // The tip stands 0.1 over the point at first, and touches the floor 1.4 beside it: there the corner's circle is √(0.4² + 0.9²)
+        // from the point, which is less than its radius.
+        let bull = Cutter { radius: 2.0, corner: 1.0 };
+        let pass = Pass::Lines(vec![[0.0, 0.0, 0.1], [0.0, 0.7, 0.1], [0.0, 1.4, 0.0]]);
+        assert!(pass.distance(bull, [0.0, 0.0, 0.1]) <= 0.97f64.sqrt() - 1.0 + 1e-12);
+    }
+
+    #[test]
+    fn distances_are_those_of_many_tools_on_the_way() {
+        let way = vec![[0.0, 0.0, 0.0], [0.3, 0.2, 0.05], [0.5, 0.1, 0.02], [0.2, 0.6, -0.1], [0.2, 1.2, -0.1]];
+        let pass = Pass::Lines(way.clone());
+        for (cutter, n) in [(2.0, 0.0), (2.0, 1.0), (3.0, 3.0)].into_iter().flat_map(|form| (0..200).map(move |n| (form, n))) {
+            let cutter = Cutter { radius: cutter.0, corner: cutter.1 };
+            let p = [f64::from(n % 10) * 0.3 - 1.3, f64::from(n / 10) * 0.1 - 0.5, f64::from(n % 7) * 0.1 - 0.3];
+            let mut least = f64::INFINITY;
+            for [from, to] in way.array_windows() {
+                let at = |k: i32| plus(*from, times(minus(*to, *from), f64::from(k) / 500.0));
+                least = (0..=500).map(|k| cutter.distance(minus(p, at(k)))).fold(least, f64::min);
+            }
+            let found = pass.distance(cutter, p);
+            assert!(found < least + 1e-9 && found > least - 0.002, "{cutter:?} {p:?}: {found}, {least}");
+        }
     }
 }

@@ -141,21 +141,38 @@ mod tests {
         }
     }
 
+    /// Passes of a bull nose around a saddle, where its tip goes from one side of the place that it touches to the other.
+    fn saddle() -> Case {
+        let cutter = Cutter { radius: 2.0, corner: 1.0 };
+        Case { surface: Surface::Free(1.0, 40.0), cutter, step: 0.5, passes: 8, length: 14.0, zigzag: false, ..wavy() }
+    }
+
     #[test]
     fn no_pass_holds_a_vertex_deep_inside() {
         // Passes that are skipped must not cut deeper than those that were looked at: all of them are asked here.
-        let case = wavy();
-        let passes = passes(&case);
-        let (_, links) = program(&case, &passes);
-        let lattice = Lattice::of(&case);
-        let tops = Sweep::of(&case, &passes, &links).tops(&lattice);
-        for (j, row) in tops.iter().enumerate() {
-            for (i, (point, height)) in row.iter().enumerate().filter(|(i, _)| lattice.is_within(*i, j)) {
-                let all = passes.iter().chain(&links).map(|pass| pass.distance(case.cutter, *point));
-                let least = all.fold(f64::INFINITY, f64::min);
-                assert!(least.abs() < 1e-6, "vertex {i} of row {j}, {height} high, is {least} away from the volume");
+        for case in [wavy(), saddle()] {
+            let passes = passes(&case);
+            let (_, links) = program(&case, &passes);
+            let lattice = Lattice::of(&case);
+            let tops = Sweep::of(&case, &passes, &links).tops(&lattice);
+            for (j, row) in tops.iter().enumerate() {
+                for (i, (point, height)) in row.iter().enumerate().filter(|(i, _)| lattice.is_within(*i, j)) {
+                    let all = passes.iter().chain(&links).map(|pass| pass.distance(case.cutter, *point));
+                    let least = all.fold(f64::INFINITY, f64::min);
+                    assert!(least.abs() < 1e-6, "vertex {i} of row {j}, {height} high, is {least} away from the volume");
+                }
             }
         }
+    }
+
+    #[test]
+    fn nothing_is_cut_below_the_surface() {
+        // A straight move of 0.25 goes below the surface by its length squared over 8 radii of curvature, which are 40 and more here.
+        let case = saddle();
+        let passes = passes(&case);
+        let tops = Sweep::of(&case, &passes, &[]).tops(&Lattice::of(&case));
+        let least = tops.iter().flatten().map(|top| top.1).fold(f64::INFINITY, f64::min);
+        assert!((-2e-4..0.0).contains(&least), "{least}");
     }
 
     #[test]

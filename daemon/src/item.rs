@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use suture_core::report::{Certificate, Outcome, RuleOutcome, Task};
+use suture_core::report::{Certificate, Outcome, RuleOutcome, Simplified, Task};
 use suture_core::{ErrorClass, Limits, Profile, Report};
 
 use crate::beside;
@@ -259,10 +259,15 @@ pub(crate) fn tell(input: &Path, result: &Result<Box<Report>, Failure>, order: &
     }
 }
 
-/// Good if the result is, and no feature had to stay because the mesh is not good without it, or for want of memory.
+/// Good if the result is, and each step was taken that was asked for: none was left because the mesh is not good without it, for want of memory, or for a file
+/// that it needs.
 fn exit_of(report: &Report) -> Exit {
-    let is_in_vain = report.features.as_ref().is_some_and(|features| features.why_not.is_some());
-    if report.outcome.is_good() && !is_in_vain { Exit::Good } else { Exit::NotGood }
+    let is_refused = |told: &Simplified| told.before == 0 && told.why_not.is_some();
+    let is_left = report.features.as_ref().is_some_and(|told| told.why_not.is_some())
+        || report.residue.as_ref().is_some_and(|told| told.why_not.is_some())
+        || report.smoothed.as_ref().is_some_and(|told| told.why_not.is_some())
+        || report.simplified.as_ref().is_some_and(is_refused);
+    if report.outcome.is_good() && !is_left { Exit::Good } else { Exit::NotGood }
 }
 
 /// Whether `certificate` holds for the file that `report` is of, in one line; good only if it says that the file is printable.
@@ -367,6 +372,30 @@ mod tests {
         features.why_not = Some("without its features the mesh is not good".into());
         report.features = Some(features);
         assert_eq!(exit_of(&report), Exit::NotGood);
+    }
+
+    /// A mesh whose tool path cannot be read keeps its residue, good as it is; more triangles than were asked for are told of, and no fault.
+    #[test]
+    fn steps_that_were_not_taken_are_told_by_the_exit() {
+        let with = |change: &dyn Fn(&mut Report)| {
+            let mut report = table::tests::sample(Outcome::Clean);
+            change(&mut report);
+            exit_of(&report)
+        };
+        let why = || Some("a reason".to_owned());
+        let residue =
+            |why_not: Option<String>| with(&|report| report.residue.get_or_insert_default().why_not.clone_from(&why_not));
+        assert_eq!([residue(None), residue(why())], [Exit::Good, Exit::NotGood]);
+        let smoothed =
+            |why_not: Option<String>| with(&|report| report.smoothed.get_or_insert_default().why_not.clone_from(&why_not));
+        assert_eq!([smoothed(None), smoothed(why())], [Exit::Good, Exit::NotGood]);
+        let simplified = |before| {
+            with(&|report| {
+                let told = report.simplified.get_or_insert_default();
+                (told.before, told.why_not) = (before, why());
+            })
+        };
+        assert_eq!([simplified(100), simplified(0)], [Exit::Good, Exit::NotGood]);
     }
 
     /// One line each, and only what is certified and the same is good.

@@ -166,7 +166,7 @@ fn corrections_that_are_none_are_named() {
         ("--brush", "beyond.txt", "beyond.txt: it names triangle 4000000000, and the mesh has"),
         ("--mask", "word.txt", "word.txt: "),
     ] {
-        let told = run(&place, &with_path(&tool, &[option, file]), 0);
+        let told = run(&place, &with_path(&tool, &[option, file]), 1);
         assert!(told["residue"]["why_not"].as_str().is_some_and(|why| why.starts_with(words)), "{}", told["residue"]);
         assert!(place.read("out.stl") == place.read("in.stl"));
     }

@@ -59,8 +59,13 @@ fn read(place: &Place, name: &str) -> Vec<Triangle> {
 
 /// Runs a command on `in.stl`, and what its report says.
 fn run(place: &Place, command: &str, options: &[&str]) -> Value {
+    run_to(place, 0, command, options)
+}
+
+/// The same, with this exit code.
+fn run_to(place: &Place, code: i32, command: &str, options: &[&str]) -> Value {
     let paths = ["in.stl", "-o", "out.stl", "--report", "report.json", "--force"];
-    place.suture([&[command], &paths[..], options].concat()).expect(0);
+    place.suture([&[command], &paths[..], options].concat()).expect(code);
     serde_json::from_slice(&place.read("report.json")).unwrap()
 }
 
@@ -228,7 +233,7 @@ fn a_path_that_is_no_path_is_named_and_the_mesh_stays() {
     place.put("in.stl", &stl::mesh(&sphere(|_, _| 0.0)));
     place.put("lathe.nc", b"G21 G90\nG1 X1 F100\nG33 Z-5 K1\n");
     for (path, words) in [("lathe.nc", "line 3"), ("none.nc", "cannot be read"), ("in.stl", "neither G-code nor APT")] {
-        let told = run(&place, "residue", &["--toolpath", path, "--tool", "ball,d=6"]);
+        let told = run_to(&place, 1, "residue", &["--toolpath", path, "--tool", "ball,d=6"]);
         assert!(told["residue"]["why_not"].as_str().unwrap().contains(words), "{told}");
         assert!(place.read("out.stl") == place.read("in.stl"));
     }

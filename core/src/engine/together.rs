@@ -5,7 +5,7 @@
 
 use crate::contract::report::{
     BoundaryLoops, Certificate, Defects, EditSummary, Faithful, Features, MOST_LISTED, ObjectReport, Outcome, Regions, Repair,
-    Report, RuleOutcome, SelfIntersections, Skin, SkinChange, ThinWalls, Verdict, Volumes,
+    Report, Residue, RuleOutcome, SelfIntersections, Simplified, Skin, SkinChange, Smoothed, ThinWalls, Verdict, Volumes,
 };
 
 /// A part of a package, as errors and reports name it.
@@ -105,6 +105,9 @@ fn join(all: &mut Report, section: &Section) {
     }
     merge(&mut all.thin_walls, &report.thin_walls, thin_walls);
     merge(&mut all.features, &report.features, features);
+    merge(&mut all.residue, &report.residue, residue);
+    merge(&mut all.smoothed, &report.smoothed, smoothed);
+    merge(&mut all.simplified, &report.simplified, simplified);
     for stage in &report.stages {
         match all.stages.iter_mut().find(|there| there.name == stage.name) {
             Some(there) => there.seconds += stage.seconds,
@@ -321,6 +324,40 @@ fn features(all: &mut Features, other: &Features) {
     all.triangles_added += other.triangles_added;
     all.why_not = all.why_not.take().or_else(|| other.why_not.clone());
     append(&mut all.listed, &other.listed);
+}
+
+fn residue(all: &mut Residue, other: &Residue) {
+    all.moved += other.moved;
+    all.displacement = all.displacement.max(other.displacement);
+    all.deviation = all.deviation.max(other.deviation);
+    all.volume_change += other.volume_change;
+    all.triangles_before += other.triangles_before;
+    all.triangles_after += other.triangles_after;
+    merge(&mut all.path_fit, &other.path_fit, |all, other| *all = all.min(*other));
+    all.path_axes = all.path_axes.take().or_else(|| other.path_axes.clone());
+    let new = other.findings.iter().filter(|finding| !all.findings.contains(finding)).cloned().collect::<Vec<_>>();
+    append(&mut all.findings, &new);
+    all.why_not = all.why_not.take().or_else(|| other.why_not.clone());
+    append(&mut all.regions, &other.regions);
+    merge(&mut all.suspects, &other.suspects, |all, other| append(all, other));
+}
+
+fn smoothed(all: &mut Smoothed, other: &Smoothed) {
+    all.passes = all.passes.max(other.passes);
+    all.moved += other.moved;
+    all.held += other.held;
+    all.displacement = all.displacement.max(other.displacement);
+    all.volume_change += other.volume_change;
+    all.why_not = all.why_not.take().or_else(|| other.why_not.clone());
+}
+
+fn simplified(all: &mut Simplified, other: &Simplified) {
+    all.before += other.before;
+    all.after += other.after;
+    all.to_result = all.to_result.max(other.to_result);
+    all.from_result = all.from_result.max(other.from_result);
+    all.volume_change += other.volume_change;
+    all.why_not = all.why_not.take().or_else(|| other.why_not.clone());
 }
 
 fn thin_walls(all: &mut ThinWalls, other: &ThinWalls) {

@@ -445,3 +445,45 @@ fn amf_has_no_centimetre() {
         let _ = std::fs::remove_file(&output);
     }
 }
+
+/// A ball as an object: rings of triangles between two poles.
+fn ball(id: u32, radius: f64) -> String {
+    let (rings, around) = (12, 24);
+    let at = |ring: usize, k: usize| {
+        let (tilt, turn) = (std::f64::consts::PI * ring as f64 / rings as f64, std::f64::consts::TAU * k as f64 / around as f64);
+        let [x, y, z] = [tilt.sin() * turn.cos(), tilt.sin() * turn.sin(), tilt.cos()].map(|x| radius * x);
+        format!("<vertex x=\"{x}\" y=\"{y}\" z=\"{z}\"/>")
+    };
+    let number = |ring: usize, k: usize| match ring {
+        0 => 0,
+        ring if ring == rings => 1 + (rings - 1) * around,
+        ring => 1 + (ring - 1) * around + k % around,
+    };
+    let inner: String = (1..rings).flat_map(|ring| (0..around).map(move |k| (ring, k))).map(|(ring, k)| at(ring, k)).collect();
+    let quads = (0..rings).flat_map(|ring| (0..around).map(move |k| (ring, k)));
+    let corners = |(ring, k)| [number(ring, k), number(ring + 1, k), number(ring + 1, k + 1), number(ring, k + 1)];
+    let halves = quads.map(corners).flat_map(|[a, b, c, d]| [[a, b, c], [a, c, d]]);
+    let faces: Vec<[usize; 3]> = halves.filter(|[a, b, c]| a != b && b != c && c != a).collect();
+    object(id, &[at(0, 0), inner, at(rings, 0)].concat(), &triangles(&faces, |_| String::new()))
+}
+
+/// The report of both objects has the sums of their counts, and the largest of their distances.
+#[test]
+fn what_was_done_to_the_surfaces_is_told_of_all_objects() {
+    let profile = Profile { simplify_ratio: 0.25, smooth_waves_below_mm: 1.0, ..Profile::default() };
+    let told = |objects: &[String]| {
+        let Report { simplified, smoothed, .. } = Repaired::of(&package(objects, &[]), &profile).report;
+        (simplified.unwrap(), smoothed.unwrap())
+    };
+    let [small, large, both] =
+        [vec![ball(1, 1.0)], vec![ball(1, 30.0)], vec![ball(1, 1.0), ball(2, 30.0)]].map(|objects| told(&objects));
+    assert_eq!(both.0.before, 2 * 528);
+    assert_eq!(both.0.after, small.0.after + large.0.after);
+    assert!(large.0.to_result > 10.0 * small.0.to_result && small.0.to_result > 0.0, "{small:?} {large:?}");
+    assert_eq!([both.0.to_result, both.0.from_result], [large.0.to_result, large.0.from_result]);
+    assert_eq!(both.0.volume_change, small.0.volume_change + large.0.volume_change);
+    assert!(small.1 != large.1, "{small:?} {large:?}");
+    assert_eq!([both.1.moved, both.1.held], [small.1.moved + large.1.moved, small.1.held + large.1.held]);
+    assert_eq!(both.1.displacement, small.1.displacement.max(large.1.displacement));
+    assert_eq!(both.1.why_not.is_some(), small.1.why_not.is_some() || large.1.why_not.is_some());
+}

@@ -128,14 +128,14 @@ fn changed(
     let own = Edit::default().then(mesh.records(), &change.gone, std::mem::take(&mut change.added), step.repair());
     let counts = [change.count_gone(), own.added_with_origins().count() as u64];
     let next = Next::write(mesh, &own, output, work)?;
-    let written = files::open(next.path(), limits, progress)?.called(mesh.path());
+    let written = files::open(&next.path(), limits, progress)?.called(mesh.path());
     let judged = files::look(&written, (profile, limits), progress, &mut Clock::start())?;
     if !shaping::is_no_worse(report, &judged) {
         change.told.left(&judged).put(report);
         drop(written);
         return next.give_up(mesh, report, work);
     }
-    let facts = FileFacts { path: next.path().into(), ..judged.input.clone() };
+    let facts = FileFacts { path: next.path(), ..judged.input.clone() };
     *edit = match std::mem::take(edit) {
         // The mesh is of the input's records.
         so_far if so_far.is_empty() => own,
@@ -143,14 +143,14 @@ fn changed(
     };
     shaping::tell(report, (step, change.told, counts), judged, Some((edit, records.len())));
     Ok(Some(match next {
-        Next::Spool(spool, _) => Last::Spool(spool),
+        Next::Spool(spool) => Last::Spool(spool),
         Next::Output(written, _) => Last::Output(written, facts),
     }))
 }
 
 /// A mesh that is written, and not judged yet.
 enum Next<'a> {
-    Spool(Nameless, PathBuf),
+    Spool(Nameless),
     Output(Written, &'a Path),
 }
 
@@ -162,15 +162,14 @@ impl<'a> Next<'a> {
             return Ok(Self::Output(emit::write(mesh, path, &content, limits, progress)?, path));
         }
         let spool = Nameless::new(limits)?;
-        let path = spool.path();
-        emit::write(mesh, &path, &content, &of_spools(limits), progress)?.durable()?;
-        Ok(Self::Spool(spool, path))
+        emit::write(mesh, &spool.path(), &content, &of_spools(limits), progress)?.durable()?;
+        Ok(Self::Spool(spool))
     }
 
-    fn path(&self) -> &Path {
+    fn path(&self) -> PathBuf {
         match self {
-            Self::Spool(_, path) => path,
-            Self::Output(_, path) => path,
+            Self::Spool(spool) => spool.path(),
+            Self::Output(_, path) => path.into(),
         }
     }
 
@@ -266,7 +265,7 @@ mod tests {
         let nameless = Nameless::new(&limits.spooling_beside(&place.input)).unwrap();
         for output in [place.folder.path().join("worse.stl"), nameless.path()] {
             let next = Next::write(&mesh, &edit, Some(&output), work).unwrap();
-            assert_eq!(files::open(next.path(), &limits, &Quiet).unwrap().records().len(), 11);
+            assert_eq!(files::open(&next.path(), &limits, &Quiet).unwrap().records().len(), 11);
             let Some(Last::Output(written, facts)) = next.give_up(&mesh, &report, work).unwrap() else { unreachable!() };
             written.durable().unwrap();
             assert_eq!(std::fs::read(&output).unwrap(), std::fs::read(&place.input).unwrap());

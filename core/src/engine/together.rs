@@ -125,6 +125,11 @@ fn merge<T: Clone>(all: &mut Option<T>, other: &Option<T>, join: impl FnOnce(&mu
     }
 }
 
+/// The first one that is there.
+fn keep_first<T: Clone>(all: &mut Option<T>, other: &Option<T>) {
+    merge(all, other, |_, _| ());
+}
+
 fn append<T: Clone>(all: &mut Vec<T>, other: &[T]) {
     let room = MOST_LISTED.saturating_sub(all.len());
     all.extend(other.iter().take(room).cloned());
@@ -322,7 +327,7 @@ fn features(all: &mut Features, other: &Features) {
     all.left += other.left;
     all.triangles_gone += other.triangles_gone;
     all.triangles_added += other.triangles_added;
-    all.why_not = all.why_not.take().or_else(|| other.why_not.clone());
+    keep_first(&mut all.why_not, &other.why_not);
     append(&mut all.listed, &other.listed);
 }
 
@@ -334,10 +339,10 @@ fn residue(all: &mut Residue, other: &Residue) {
     all.triangles_before += other.triangles_before;
     all.triangles_after += other.triangles_after;
     merge(&mut all.path_fit, &other.path_fit, |all, other| *all = all.min(*other));
-    all.path_axes = all.path_axes.take().or_else(|| other.path_axes.clone());
+    keep_first(&mut all.path_axes, &other.path_axes);
     let new = other.findings.iter().filter(|finding| !all.findings.contains(finding)).cloned().collect::<Vec<_>>();
     append(&mut all.findings, &new);
-    all.why_not = all.why_not.take().or_else(|| other.why_not.clone());
+    keep_first(&mut all.why_not, &other.why_not);
     append(&mut all.regions, &other.regions);
     merge(&mut all.suspects, &other.suspects, |all, other| append(all, other));
 }
@@ -348,7 +353,7 @@ fn smoothed(all: &mut Smoothed, other: &Smoothed) {
     all.held += other.held;
     all.displacement = all.displacement.max(other.displacement);
     all.volume_change += other.volume_change;
-    all.why_not = all.why_not.take().or_else(|| other.why_not.clone());
+    keep_first(&mut all.why_not, &other.why_not);
 }
 
 fn simplified(all: &mut Simplified, other: &Simplified) {
@@ -357,7 +362,7 @@ fn simplified(all: &mut Simplified, other: &Simplified) {
     all.to_result = all.to_result.max(other.to_result);
     all.from_result = all.from_result.max(other.from_result);
     all.volume_change += other.volume_change;
-    all.why_not = all.why_not.take().or_else(|| other.why_not.clone());
+    keep_first(&mut all.why_not, &other.why_not);
 }
 
 fn thin_walls(all: &mut ThinWalls, other: &ThinWalls) {

@@ -152,7 +152,7 @@ impl<'a> Course<'a> {
             let before = self.current().len();
             let passed = self.pass(turn).run()?;
             let after = passed.spool.0.records().len();
-            tracing::debug!("{turn:?}: {before} triangles become {after}, proved within {:?}", passed.proved);
+            tracing::debug!("{turn:?}: {before} triangles become {after}, proved within {:?}", passed.taken.proved);
             self.take(turn, passed);
         }
         Ok(self.change())
@@ -213,23 +213,23 @@ impl<'a> Course<'a> {
     }
 
     /// Goes on with what a pass left.
-    fn take(&mut self, turn: Turn, passed: Passed) {
+    fn take(&mut self, turn: Turn, Passed { spool, taken, plan }: Passed) {
         // The last ones before the pass were those of the input.
         let new = self.current().len() - self.survivors;
         let before = std::mem::take(&mut self.stays);
         self.stays = bits::of(
             self.records.len(),
-            bits::ones(&before).zip(new..).filter(|(_, at)| bits::holds(&passed.stays, *at)).map(|(number, _)| number),
+            bits::ones(&before).zip(new..).filter(|(_, at)| bits::holds(&taken.stays, *at)).map(|(number, _)| number),
         );
         self.survivors = bits::count(&self.stays) as usize;
         // Each bound is rounded upwards when it is made, and so is their sum.
-        for (sum, bound) in self.proved.iter_mut().zip(passed.proved) {
+        for (sum, bound) in self.proved.iter_mut().zip(taken.proved) {
             *sum = if bound > 0.0 { (*sum + bound).next_up() } else { *sum };
         }
-        self.volume += passed.volume;
-        self.ended = passed.ended;
-        (self.last, self.plan, self.missed) = (Some(turn), passed.plan, passed.missed);
-        self.spool = Some(passed.spool);
+        self.volume += taken.volume;
+        self.ended = taken.ended;
+        (self.last, self.plan, self.missed) = (Some(turn), plan, taken.missed);
+        self.spool = Some(spool);
     }
 
     /// The triangles that go and come.

@@ -44,6 +44,13 @@ pub(super) struct Pass<'a> {
 pub(super) struct Passed {
     /// New triangles, by cells, then those that stay, in their order.
     pub(super) spool: Spooled,
+    pub(super) taken: Taken,
+    /// The planes between the cells.
+    pub(super) plan: Option<Plan>,
+}
+
+/// The results of cells, taken together.
+pub(super) struct Taken {
     /// Triangles that stay, a bit each.
     pub(super) stays: Vec<u64>,
     /// Bounds of the distance both ways.
@@ -53,21 +60,14 @@ pub(super) struct Passed {
     pub(super) ended: Ended,
     /// How many more triangles are left in cells than were wanted there.
     pub(super) missed: usize,
-    /// The planes between the cells.
-    pub(super) plan: Option<Plan>,
-}
-
-/// What was taken from cells so far.
-#[derive(Default)]
-struct Taken {
-    stays: Vec<u64>,
-    proved: [f64; 2],
-    volume: f64,
-    ended: Ended,
-    missed: usize,
 }
 
 impl Taken {
+    /// No cell yet: so many triangles stay.
+    fn new(triangles: usize) -> Self {
+        Self { stays: bits::all(triangles), proved: [0.0; 2], volume: 0.0, ended: Ended::Count, missed: 0 }
+    }
+
     /// Takes from cells, in their order, what came of them.
     fn take(&mut self, all: Vec<Made>, append: &mut dyn FnMut(&[Record]) -> Failing<()>) -> Failing<()> {
         for made in all {
@@ -89,7 +89,7 @@ impl Pass<'_> {
         // How many own triangles are to be left in each, if a count is wanted.
         let left = self.wanted.map(|wanted| shares(&cells.own(), self.records.len(), (wanted, self.is_of_all)));
         let batches = self.batches(&cells)?;
-        let mut taken = Taken { stays: bits::all(self.records.len()), ended: Ended::Count, ..Taken::default() };
+        let mut taken = Taken::new(self.records.len());
         let spool = nameless_stl::filled(self.path, self.records.len(), self.work, |append| {
             let mut read = batches.first().map(|batch| cells.read(batch)).unwrap_or_default();
             let mut made = Vec::new();
@@ -110,8 +110,7 @@ impl Pass<'_> {
             taken.take(made, append)?;
             self.append_what_stays(&taken.stays, append)
         })?;
-        let Taken { stays, proved, volume, ended, missed } = taken;
-        Ok(Passed { spool, stays, proved, volume, ended, missed, plan: cells.into_plan() })
+        Ok(Passed { spool, taken, plan: cells.into_plan() })
     }
 
     /// Cells in their order, some at a time, so that each batch has room in memory.

@@ -126,8 +126,8 @@ fn seams_stay_in_a_pass_and_go_with_others() {
     let plan = Plan::shifted(&records, &crate::io::read_ahead::Guide::new(records.as_flattened(), &limits), SIZES[0].cell, 0.0);
     let is_of_seam = |record: &Record| record::corners(record).windows(2).any(|two| plan.home(two[0]) != plan.home(two[1]));
     let seams: Vec<usize> = (0..records.len()).filter(|at| is_of_seam(&records[*at])).collect();
-    assert!(seams.len() > 300 && seams.iter().all(|at| bits::holds(&passed.stays, *at)), "{}", seams.len());
-    let stay: Vec<Record> = bits::ones(&passed.stays).map(|at| records[at as usize]).collect();
+    assert!(seams.len() > 300 && seams.iter().all(|at| bits::holds(&passed.taken.stays, *at)), "{}", seams.len());
+    let stay: Vec<Record> = bits::ones(&passed.taken.stays).map(|at| records[at as usize]).collect();
     assert!(passed.spool.0.records().ends_with(&stay) && stay.len() < records.len() / 3);
     course.take(Turn::First, passed);
     let next = course.pass(Turn::Strips).run().unwrap();
@@ -159,7 +159,7 @@ fn the_second_pass_touches_what_is_near_to_seams_alone() {
     let is_far = |record: &Record| record::corners(record).iter().all(|p| (p[axis] - at).abs() > 2.0);
     let far: Vec<usize> = (0..before).filter(|i| is_far(&course.current()[*i])).collect();
     assert!(far.len() > before / 3, "{} of {before}", far.len());
-    assert!(far.iter().all(|i| bits::holds(&second.stays, *i)));
+    assert!(far.iter().all(|i| bits::holds(&second.taken.stays, *i)));
     // Corners of no triangle that goes across the plane: they stay where the first pass put them.
     let is_across = |record: &&Record| {
         record::corners(record).iter().any(|p| p[axis] < at) && record::corners(record).iter().any(|p| p[axis] >= at)
@@ -186,7 +186,7 @@ fn cells_go_on_where_seams_are_not_enough() {
     let limits = limits(2, 1 << 30);
     let mut course = course((&records, &SIZES[0]), &profile, &limits);
     let first = course.pass(Turn::First).run().unwrap();
-    assert!(first.missed > 300, "{}", first.missed);
+    assert!(first.taken.missed > 300, "{}", first.taken.missed);
     course.take(Turn::First, first);
     assert_eq!(course.next(), Some(Turn::Shifted));
     let told = run(&records, &SIZES[0], &profile, &limits).unwrap().told;
